@@ -12,6 +12,8 @@ _CATEGORIES = frozenset({"Cc", "Zl", "Zp", "Cs"})
 _UNSEEN = frozenset("ZC")
 #: What a text of several lines may have of these.
 _LINES = frozenset("\n\r\t")
+#: Of a service without a bench, with what follows from it after a semicolon or a comma.
+NO_BENCH = "this service drives no bench"
 
 
 def counted(number: int, noun: str) -> str:

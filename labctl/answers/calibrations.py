@@ -109,6 +109,12 @@ class ImproveRequest(Request):
         description=f"{SEVERAL} Default: the recordings of the version, if it was fitted to several.",
     )
     accept_warnings: bool = Field(default=False, description=ACCEPT)
+    as_version: int | None = Field(
+        default=None,
+        ge=1,
+        description="Number that the new version is expected to have. Where another one has it already, nothing is "
+        "made (409): two requests of the same page make one version. Default: the next number.",
+    )
 
 
 class ModelResponse(ResponseModel):

@@ -211,7 +211,9 @@ class MissingFactResponse(ResponseModel):
     )
     key: str = Field(default="", description="Its key in that table; empty: the order cannot state it, or has several.")
     remedy: str = Field(
-        default="", description="What a person does where the order cannot state it, in a sentence; else empty."
+        default="",
+        description="What a person does where the order cannot state it, or has later certificates state it, in a "
+        "sentence; else empty.",
     )
 
 

@@ -113,8 +113,12 @@ class UncertaintyResponse(ResponseModel):
         "not state it: fit it again.",
     )
     not_stated: list[str] = Field(
-        description="Reference standards whose uncertainty the bench file does not "
-        "state; U does not contain their contributions."
+        description="Reference standards whose uncertainty is not stated; U does not contain their contributions."
+    )
+    not_stated_remedy: str = Field(
+        default="",
+        description="What brings them into U, by where the measurements came from: their place in the bench file, or "
+        "in the files of the import. Empty: all are stated.",
     )
     overdue: bool = Field(description="Whether a standard was past its due date when it was used.")
     grid: UncertaintyGrid | None = Field(

@@ -14,6 +14,7 @@ from labctl.answers.common_fields import (
     FormatTitle,
     MaxError,
     MeanError,
+    ModelName,
     OutputAxis,
     PersonName,
     RecipeName,
@@ -44,6 +45,20 @@ class RecalibrationResponse(ResponseModel):
     bench: BenchName
 
 
+class CalibrationEventResponse(ResponseModel):
+    """A version of a unit that was made, or that was certified or revoked."""
+
+    serial: Serial
+    version: VersionNumber
+    act: Literal["made", "certify", "revoke"] = Field(
+        description="made: it was fitted, or changed from another version; certify, revoke: it was certified, or its "
+        "certification revoked."
+    )
+    at: datetime = Field(description="Time of the event.")
+    by: str = Field(description="Person who certified or revoked it; empty for a version that was made.")
+    model: ModelName
+
+
 UnitState = Literal["in_force", "overdue", "none"]
 
 
@@ -65,6 +80,10 @@ class UnitResponse(ResponseModel):
     technology: str | None = Field(description=TECHNOLOGY)
     batch: str = Field(default="", description="Batch of the manufacturer; empty: not stated.")
     supplier: str = Field(default="", description="Supplier of the unit; empty: not stated.")
+    axes: list[Literal["x", "y", "z"]] = Field(
+        default_factory=list,
+        description="Output axes of the newest recording; empty: there is no recording, or the response lists units.",
+    )
     recordings: list[int] = Field(description="Numbers of the unit's recordings.")
     calibrations: list[int] = Field(description="Numbers of the unit's calibration versions.")
     newest_errors: VersionErrors = Field(description="Errors of the newest versions over the noise floor.")

@@ -46,8 +46,7 @@ def bound_lines(calibration: Calibration) -> list[str]:
     lines += _any_axis_lines(calibration)
     if bound_list and use_bounds is not None and use_bounds["not_stated"]:
         lines.append(
-            f"Uncertainties that the bench does not state, and that U does not contain: "
-            f"{', '.join(use_bounds['not_stated'])}."
+            f"Uncertainties that are not stated, and that U does not contain: {', '.join(use_bounds['not_stated'])}."
         )
     return lines
 

@@ -74,8 +74,11 @@ def _draw(
         drawn.add(name)
 
 
-def contributions_html(title: str, over: Mapping[str, ContributionsOverJson], not_stated: Sequence[str]) -> str:
-    """Return a page that needs no server: the figure, and which standards are not in it."""
-    note = f"<p>Not stated, and in no line: {escape(', '.join(not_stated))}.</p>" if not_stated else ""
+def contributions_html(
+    title: str, over: Mapping[str, ContributionsOverJson], not_stated: Sequence[str], remedy: str = ""
+) -> str:
+    """Return a page that needs no server: the figure, and which standards are not in it and what brings them there."""
+    text = f"Not stated, and in no line: {', '.join(not_stated)}. {remedy}".rstrip()
+    note = f"<p>{escape(text)}</p>" if not_stated else ""
     drawn = figure_part(Picture("contributions", TITLE, CAPTION, contributions(over)))
     return whole_page(title, [f"<h1>{escape(title)}</h1>", note, drawn], drawn=True)

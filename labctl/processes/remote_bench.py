@@ -27,7 +27,7 @@ from labctl.services.campaigns.listeners import ChangeListeners
 from labctl.services.commands.acts.abort import ABORT
 from labctl.services.commands.context import WRITES_S, BenchAct, CommandContext, RequestT, ResponseT
 from labctl.services.commands.requests import CampaignStart, ToCampaign
-from labctl.services.commands.service_control import NO_BENCH
+from labctl.services.commands.service_control import WITHOUT_BENCH
 from labctl.stop.client import StopAttempt, not_stopped_text
 from labctl.stop.latch import LatchState, StopRequest
 from labctl.stop.places import BenchPlace, place_of
@@ -84,13 +84,13 @@ class RemoteControl:
     def bench_of(self, _: CampaignStart) -> BenchFile:
         """Return the bench of the bench process. Raises Conflict without one."""
         if self._bench is None:
-            raise Conflict(NO_BENCH)
+            raise Conflict(WITHOUT_BENCH)
         return self._bench
 
     def own_bench(self) -> BenchFile | None:
         """Return the bench of the bench process. Raises Conflict without one."""
         if self._bench is None:
-            raise Conflict(NO_BENCH)
+            raise Conflict(WITHOUT_BENCH)
         return self._bench
 
     def perform(self, act: BenchAct[RequestT, ResponseT], _: CommandContext, request: RequestT) -> ResponseT:
@@ -125,7 +125,7 @@ class RemoteControl:
     def stop(self, reason: str) -> StopResponse:
         """Stop the bench, whatever runs there. Raises NotStopped, Conflict without a bench."""
         if self._place is None or self._bench is None:
-            raise Conflict(NO_BENCH)
+            raise Conflict(WITHOUT_BENCH)
         attempt = self._attempt(reason, None)
         outcome = attempt.result(STANDS_S)
         if outcome is None or not outcome.stands:

@@ -10,6 +10,7 @@ from pathlib import Path
 from labctl.config import default_database
 from labctl.errors import BadInput
 from labctl.stop.page import PageAccess
+from labctl.texts import NO_BENCH
 
 SIMULATED_BENCH = "triaxial-sim"
 LAST_PORT = 65535
@@ -74,8 +75,7 @@ class ServeRequest:
             )
         if self.wire_logs is not None and self.bench_name is None:
             raise BadInput(
-                f"--wire-logs {self.wire_logs}: this service drives no bench; give --bench or --simulate, or leave the "
-                "option out"
+                f"--wire-logs {self.wire_logs}: {NO_BENCH}; give --bench or --simulate, or leave the option out"
             )
         if not 0 <= self.port <= LAST_PORT:
             raise BadInput(f"--port {self.port}: give a port from 1 to {LAST_PORT}, or 0 for a free port")

@@ -43,6 +43,7 @@ from labctl.stop.client import LATCH_S, AttemptedStop, StopAttempt, end_process
 from labctl.stop.latch import StopRequest
 from labctl.stop.places import BenchPlace, ProcessId, place_of
 from labctl.stop.wire import Stopping
+from labctl.texts import NO_BENCH
 from procedures.execution.signals import ENDING, restore
 
 log = get_logger()
@@ -177,7 +178,7 @@ class Supervisor:
     def _respond(self, stop: StopRequest) -> Stopping:
         """Begin a stop that came over HTTP while no web process answered."""
         if self._place is None:
-            return StopElsewhere("this service drives no bench", stands=True)
+            return StopElsewhere(NO_BENCH, stands=True)
         return AttemptedStop(StopAttempt(self._place, stop))
 
     def _secure_orphan(self) -> None:
@@ -279,7 +280,7 @@ class Supervisor:
         self._latch_end()
         securing = self._secured()
         if securing is None:
-            return BenchLeft("the bench process ended without a report; this service drives no bench")
+            return BenchLeft(f"the bench process ended without a report; {NO_BENCH}")
         text = f"the bench process ended without a report; {securing.text}"
         if not securing.safe:
             text += "; the state of the bench is not known; inspect the bench"

@@ -25,7 +25,7 @@ from labctl.services.benches.start_confirmation import start_questions
 from labctl.services.calibrations.fetch_log import FetchLog
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.event_stream import CampaignEventStream
-from labctl.services.campaigns.resumability import NO_BENCH, with_resume
+from labctl.services.campaigns.resumability import RESUME_ELSEWHERE, with_resume
 from labctl.services.campaigns.status import from_rows, mark_abandoned, statuses_of
 from labctl.services.check_gyros import alarms
 from labctl.services.commands.acts.start import START_CAMPAIGN
@@ -200,7 +200,7 @@ class LabService:
             row = self.store.campaigns.get(campaign)
             answer = mark_abandoned(from_rows(self.store, row), attended=self._is_attended(campaign, row.bench_name))
         if access.bench is None:
-            return answer.model_copy(update={"resumable": False, "resume_reason": NO_BENCH})
+            return answer.model_copy(update={"resumable": False, "resume_reason": RESUME_ELSEWHERE})
         return with_resume(self.store, answer, access.bench, lambda: access.running)
 
     def campaigns(self, request: PageRequest[int]) -> Page[CampaignResponse, int]:

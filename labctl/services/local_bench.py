@@ -16,7 +16,7 @@ from labctl.services.benches.bench_left import BenchLeft
 from labctl.services.benches.confirmation import describe_bench, describe_safe_state
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.stop_requests import StopElsewhere
-from labctl.services.commands.service_control import NO_BENCH, ServiceControl
+from labctl.services.commands.service_control import WITHOUT_BENCH, ServiceControl
 from labctl.services.live.live_sessions import LiveSessions
 from labctl.services.schedule.scheduler import REAL_BENCH_LATE_LIMIT_S, Scheduler
 from labctl.stop.client import not_stopped_text
@@ -24,6 +24,7 @@ from labctl.stop.latch import StopRequest
 from labctl.stop.page import BenchNow
 from labctl.stop.wire import Stopping
 from labctl.store import Store
+from labctl.texts import NO_BENCH
 
 #: A stop of the whole bench is answered within this, s.
 STOP_S = 4.5
@@ -108,7 +109,7 @@ class LocalBench:
     def request_stop(self, stop: StopRequest) -> Stopping:
         """Begin a stop; returns how it goes on. Waits for no lock, no disk and no database."""
         if self.runner is None:
-            return StopElsewhere("this service drives no bench", stands=True)
+            return StopElsewhere(NO_BENCH, stands=True)
         return self.runner.stops.request(stop)
 
     @property
@@ -124,7 +125,7 @@ class LocalBench:
     def stop(self, reason: str) -> StopResponse:
         """Stop the bench, whatever runs there. Raises NotStopped, Conflict without a bench."""
         if self.runner is None:
-            raise Conflict(NO_BENCH)
+            raise Conflict(WITHOUT_BENCH)
         stopping = self.runner.stops.request(StopRequest.new(actor().name, actor().via, reason))
         if not stopping.is_over(STOP_S) or not stopping.stands:
             raise NotStopped(not_stopped_text(stopping.text))
@@ -138,7 +139,7 @@ class LocalBench:
     def describe_running(self) -> BenchNow:
         """Return one sentence on what runs, from memory."""
         if self.runner is None:
-            return BenchNow("This service drives no bench.")
+            return BenchNow(f"{NO_BENCH.capitalize()}.")
         bench, campaign, late = self.runner.bench.name, self.runner.running, self.runner.not_stopped
         if campaign is None:
             return BenchNow(f"No campaign runs on bench {bench}.", not_stopped=late)

@@ -11,6 +11,7 @@ from labctl.answers.common_fields import CriticismVerdict
 from labctl.answers.units import (
     BatchRequest,
     BatchResponse,
+    CalibrationEventResponse,
     ExportFormatResponse,
     RecalibrationResponse,
     UnitResponse,
@@ -69,7 +70,10 @@ def units_due(
 def unit(store: Store, serial: str, now: datetime) -> UnitResponse:
     """Return one unit; raises NotFound."""
     (answer,) = _whole(store, _answers(store, now, [store.units.get(serial)]))
-    return answer
+    if not answer.recordings:
+        return answer
+    newest = store.recordings.get(max(answer.recordings))
+    return answer.model_copy(update={"axes": list(newest.recording_info.axes)})
 
 
 def _whole(store: Store, answers: Sequence[UnitResponse]) -> list[UnitResponse]:
@@ -84,6 +88,16 @@ def _whole(store: Store, answers: Sequence[UnitResponse]) -> list[UnitResponse]:
             update={"recalibration": again.get(campaigns.get(answer.serial, 0)), "draft": drafts.get(answer.serial)}
         )
         for answer in answers
+    ]
+
+
+def calibration_events(store: Store, most: int) -> list[CalibrationEventResponse]:
+    """Return the newest versions and certifications of all units, at most so many, newest first."""
+    return [
+        CalibrationEventResponse(
+            serial=each.serial, version=each.version, act=each.act, at=each.at, by=each.by, model=each.model
+        )
+        for each in store.calibration_events.newest(most)
     ]
 
 

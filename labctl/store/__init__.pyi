@@ -36,6 +36,10 @@ from labctl.store.records import (
 )
 from labctl.store.repositories.audit import Audit as Audit, Broken as Broken, Head as Head
 from labctl.store.repositories.benches import BenchRow as BenchRow, Benches as Benches
+from labctl.store.repositories.calibration_events import (
+    CalibrationEvent as CalibrationEvent,
+    CalibrationEvents as CalibrationEvents,
+)
 from labctl.store.repositories.calibrations import Calibrations as Calibrations, NewCalibration as NewCalibration
 from labctl.store.repositories.campaign_journal import StoreJournal as StoreJournal
 from labctl.store.repositories.campaign_summaries import CampaignSummary as CampaignSummary

@@ -19,6 +19,7 @@ from labctl.store.sealing.signing import begin_signing
 if TYPE_CHECKING:
     from labctl.store.repositories.audit import Audit
     from labctl.store.repositories.benches import Benches
+    from labctl.store.repositories.calibration_events import CalibrationEvents
     from labctl.store.repositories.calibrations import Calibrations
     from labctl.store.repositories.campaigns import Campaigns
     from labctl.store.repositories.certificates import Certificates
@@ -55,6 +56,7 @@ REPOSITORIES: Mapping[str, tuple[str, str]] = {
     "resume_points": ("resume_points", "ResumePoints"),
     "benches": ("benches", "Benches"),
     "calibrations": ("calibrations", "Calibrations"),
+    "calibration_events": ("calibration_events", "CalibrationEvents"),
     "certifications": ("units", "Certifications"),
     "certified_versions": ("certified_versions", "CertifiedVersions"),
     "certificates": ("certificates", "Certificates"),
@@ -89,6 +91,7 @@ class Store:
     resume_points: ResumePoints
     benches: Benches
     calibrations: Calibrations
+    calibration_events: CalibrationEvents
     certifications: Certifications
     certified_versions: CertifiedVersions
     certificates: Certificates

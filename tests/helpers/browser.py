@@ -218,14 +218,14 @@ SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def on_page(text: str) -> str:
-    """Return a text of the service as a page writes it: with the minus sign, and powers raised."""
+    """Return a text of the service as a page writes it: with the minus sign, °C, and powers raised."""
 
     def power(found: re.Match[str]) -> str:
         return f"{found[1]} × 10{str(int(found[2])).translate(SUPERSCRIPTS)}"
 
     text = re.sub(r"(?<![\w.-])(-?\d+(?:\.\d+)?)e([+-]?\d+)(?![\w.]*\w)", power, text)
     text = re.sub(r"\^(-?\d+)", lambda found: found[1].translate(SUPERSCRIPTS), text)
-    return re.sub(r"(?<![\w-])-(?=\d|[xyz]\b)", MINUS, text)
+    return re.sub(r"(?<![\w-])-(?=\d|[xyz]\b)", MINUS, text.replace("deg C", "°C"))
 
 
 def number_of(text: str) -> float:

@@ -35,12 +35,12 @@ test("the series are environment, rate of the steps, and means in the order in w
   assert.deepEqual(
     series().map(({ id, unit }) => [id, unit]),
     [
-      ["setpoint", "deg C"],
-      ["chamber", "deg C"],
-      ["unit.A", "deg C"],
+      ["setpoint", "°C"],
+      ["chamber", "°C"],
+      ["unit.A", "°C"],
       ["rate", "deg/s"],
       ["mean.A.gyro_z", "V"],
-      ["mean.A.temperature_c", "deg C"],
+      ["mean.A.temperature_c", "°C"],
     ],
   );
   assert.deepEqual(
@@ -76,7 +76,7 @@ test("panels are one for each unit", () => {
   assert.deepEqual(
     panels(series()).map(([unit, members]) => [unit, members.length]),
     [
-      ["deg C", 4],
+      ["°C", 4],
       ["deg/s", 1],
       ["V", 1],
     ],

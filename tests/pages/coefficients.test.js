@@ -50,7 +50,7 @@ test("the reference temperature and the parameters of effects are said beside th
   const model = { terms: [term("rate_temperature_surface", {}), term("saturation", { knee_dps: 82.86656 })] };
   const said = (/** @type {Record<string, unknown>} */ coefficients) =>
     termsText(/** @type {any} */ ({ axes: { z: { coefficients } }, model, reference_temperature_c: 36 }));
-  assert.equal(said({ c_r1_t1: {} }), "T_ref is 36 deg C; saturation: knee 82.87 deg/s.");
+  assert.equal(said({ c_r1_t1: {} }), "T_ref is 36 °C; saturation: knee 82.87 deg/s.");
   assert.equal(said({ bias: {} }), "saturation: knee 82.87 deg/s.");
   // a law that is fitted: k is where it was tried, and the coefficients have what the fit found
   const sine = { terms: [term("sine_response", { k: 0.67, k_squared_z: 0.064 })] };

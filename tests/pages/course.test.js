@@ -48,8 +48,8 @@ test("a time belongs to the last sample before it and to the step that ran", () 
 test("readings of one time are those of chamber, unit, step and data set", () => {
   const rows = Object.fromEntries(readingsAt({ course: COURSE, steps: STEPS, datasets: SETS }, 115));
   assert.equal(rows.Step, "2: acquire");
-  assert.equal(rows.Chamber, "20.00 deg C");
-  assert.equal(rows.A, "22.00 deg C");
+  assert.equal(rows.Chamber, "20.00 °C");
+  assert.equal(rows.A, "22.00 °C");
   assert.equal(rows["Table rate"], "−40 deg/s");
   assert.equal(rows["Data set"], "1: complete");
   assert.equal(rows["gyro z"], "−39.98765 V");

@@ -20,7 +20,7 @@ import {
 } from "../../labctl/web/static/js/explore/dataset_rows.js";
 import { residualText, usualRecording, usualVersion } from "../../labctl/web/static/js/explore/chosen_recordings.js";
 import { sharedReasons } from "../../labctl/web/static/js/explore/experiment_reasons.js";
-import { cellsText, colourLimit, mapCells } from "../../labctl/web/static/js/explore/residual_cells.js";
+import { cellsText, mapCells } from "../../labctl/web/static/js/explore/residual_cells.js";
 
 test("a selection is written as ranges and read again", () => {
   const numbers = [3, 1, 2, 20, 7, 8];
@@ -65,12 +65,6 @@ test("data sets of the same rate and temperature share a cell", () => {
       [-10, [3], -12],
     ],
   );
-});
-
-test("the colour scale ends at the largest residual, between 3 and 10 floors", () => {
-  assert.equal(colourLimit([map]), 10);
-  assert.equal(colourLimit([{ over_floor: [1, -2] }]), 3);
-  assert.equal(colourLimit([{ over_floor: [1] }], [{ over_floor: [-5] }]), 5);
 });
 
 test("how wide a row of temperatures is, is said where it is not nothing", () => {

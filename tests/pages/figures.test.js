@@ -29,6 +29,7 @@ test("cells with commas, quotes and line ends are quoted", () => {
     [null, undefined],
   ];
   assert.equal(csvText(rows), 'a,b\n"say ""x"", y",1\n,\n');
+  assert.equal(csvText([["temperature, °C"], ["\u22125"]]), '"temperature, deg C"\n-5\n'); // signs of programs
 });
 
 test("the name of a figure is one of a file", () => {

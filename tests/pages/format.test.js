@@ -178,6 +178,10 @@ test("effects in a sentence of the service are written as their links are", () =
   assert.equal(format.inWords("scale_factor.", ids), "scale factor.");
   assert.equal(format.inWords("Missing: scale_factor (Scale factor).", ids), "Missing: scale factor.");
   assert.equal(format.inWords("scale_factor_odd (Cubic error) or more", ids), "scale factor odd (Cubic error) or more");
+  assert.equal(
+    format.inWords("scale_factor_odd (Scale factor odd (cubic)); or scale_factor_odd (Cubic (odd) error)", ids),
+    "scale factor odd (cubic); or scale factor odd (Cubic (odd) error)",
+  );
   assert.equal(format.inWords("nothing", []), "nothing");
 });
 

@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { ticksOf } from "../../labctl/web/static/js/core/log_ticks.js";
+import { roundSizes, ticksOf } from "../../labctl/web/static/js/core/log_ticks.js";
 
 /** @type {Record<string, readonly number[]>} the digits that Plotly names for a choice */
 const DIGITS = { D1: [1, 2, 3, 4, 5, 6, 7, 8, 9], D2: [1, 2, 5] };
@@ -41,4 +41,10 @@ test("an error of zero is not on the axis, and without any there is no division 
   assert.deepEqual(ticksOf([0, 0.02, 0.03]), { nticks: 5 });
   assert.deepEqual(ticksOf([0]), { nticks: 5 });
   assert.deepEqual(ticksOf([]), { nticks: 5 });
+});
+
+test("an axis that is drawn without Plotly names round sizes within its range, and has room for them", () => {
+  assert.deepEqual(roundSizes(0.02083, 0.5566), [0.05, 0.1, 0.2, 0.5]);
+  assert.deepEqual(roundSizes(0.0208, 0.0452), [0.03, 0.04]);
+  assert.deepEqual(roundSizes(2e-5, 3), [1e-4, 1e-3, 0.01, 0.1, 1]);
 });

@@ -5,7 +5,7 @@ import { test } from "node:test";
 
 import { beginOf, newsOf } from "../../labctl/web/static/js/start/news.js";
 
-/** @import { Bench, Campaign, Scheduled } from "../../labctl/web/types/api.js" */
+/** @import { Bench, CalibrationEvent, Campaign, Scheduled } from "../../labctl/web/types/api.js" */
 
 const NOW = new Date(2026, 10, 26, 8, 30);
 const TONIGHT = new Date(2026, 10, 26, 3, 0).toISOString();
@@ -39,10 +39,10 @@ const campaign = (changed) =>
 /**
  * @param {readonly Campaign[]} campaigns
  * @param {"evening" | "week" | "all"} [span]
- * @param {{ benches?: readonly Bench[], schedule?: readonly Scheduled[] }} [more]
+ * @param {{ benches?: readonly Bench[], schedule?: readonly Scheduled[], events?: readonly CalibrationEvent[] }} [more]
  */
-const news = (campaigns, span = "evening", { benches = [], schedule = [] } = {}) =>
-  newsOf({ campaigns, benches, schedule }, span, NOW);
+const news = (campaigns, span = "evening", { benches = [], schedule = [], events = [] } = {}) =>
+  newsOf({ campaigns, benches, schedule, events }, span, NOW);
 
 test("the evening before begins at 18:00 of the day before", () => {
   assert.equal(beginOf("evening", NOW), new Date(2026, 10, 25, 18).getTime());
@@ -144,4 +144,26 @@ test("a start that was missed, and a bench that is not confirmed safe, are new u
   const rows = news([], "evening", { benches: [bench], schedule: [start] });
   assert.deepEqual(rows.map((row) => row.about).sort(), ["short", "triaxial"]);
   assert.ok(rows.every((row) => row.kind === "bad"));
+});
+
+test("a version that was made, certified or revoked is new; a draft of a campaign is listed once", () => {
+  /** @type {CalibrationEvent[]} */
+  const events = [
+    { serial: "A", version: 2, act: "revoke", at: TONIGHT, by: "Bo", model: "m" },
+    { serial: "A", version: 2, act: "certify", at: TONIGHT, by: "Ann", model: "m" },
+    { serial: "A", version: 2, act: "made", at: TONIGHT, by: "", model: "bias_scale" },
+    { serial: "A", version: 1, act: "made", at: LAST_WEEK, by: "", model: "bias_scale" },
+    { serial: "B", version: 1, act: "made", at: TONIGHT, by: "", model: "m" },
+  ];
+  const drafts = /** @type {any} */ ([{ serial: "B", version: 1, certified: true, state: "made", report: null }]);
+  assert.deepEqual(
+    news([campaign({ drafts })], "evening", { events })
+      .filter(({ campaign: of }) => of === null)
+      .map(({ about, text, href }) => [about, text, href]),
+    [
+      ["A", "version 2 was revoked by Bo.", "/units/A"],
+      ["A", "version 2 was certified by Ann.", "/units/A"],
+      ["A", "version 2 was made: bias_scale.", "/explore?unit=A&version=2"],
+    ],
+  );
 });

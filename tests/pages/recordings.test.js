@@ -14,7 +14,7 @@ test("a channel has the name and the unit of its column", () => {
   assert.equal(channelName("table_rate_dps"), "table rate");
   assert.equal(channelName("board_temp_c"), "board temp");
   assert.equal(channelName("gyro_z"), "gyro output z");
-  assert.equal(channelUnit("board_temp_c"), "deg C");
+  assert.equal(channelUnit("board_temp_c"), "°C");
   assert.equal(channelUnit("gyro_z"), "deg/s");
   assert.equal(channelUnit("gyro_z", { z: { unit: "V" } }), "V");
   assert.equal(channelUnit("valid"), "");

@@ -8,7 +8,7 @@ import { superscript, typeset } from "../../labctl/web/static/js/core/typeset.js
 test("numbers have the minus sign, plus or minus is one sign, and powers are of ten", () => {
   /** @type {[text: string, shown: string][]} */
   const cases = [
-    ["-40 to 85 deg C", "−40 to 85 deg C"],
+    ["-40 to 85 deg C", "−40 to 85 °C"],
     ["rates from -100 to 100", "rates from −100 to 100"],
     ["[-0.5, 0.5] and (-3)", "[−0.5, 0.5] and (−3)"],
     ["one axis, +-90 deg/s every 15", "one axis, ±90 deg/s every 15"],
@@ -60,7 +60,7 @@ test("names that people have given stay as they are, wherever they stand in a te
   assert.equal(typeset("A -7: bias -7 deg/s"), "A −7: bias −7 deg/s");
   withNames([{ serial: "A -7", recipe: { name: "soak +-40" }, files: [{ name: "run -3 1e-3.csv" }], note: "at -5" }]);
   assert.equal(typeset("A -7: bias -7 deg/s"), "A -7: bias −7 deg/s");
-  assert.equal(typeset("soak +-40 goes to +-40 deg C"), "soak +-40 goes to ±40 deg C");
-  assert.equal(typeset("run -3 1e-3.csv (-3 deg C)"), "run -3 1e-3.csv (−3 deg C)");
+  assert.equal(typeset("soak +-40 goes to +-40 deg C"), "soak +-40 goes to ±40 °C");
+  assert.equal(typeset("run -3 1e-3.csv (-3 deg C)"), "run -3 1e-3.csv (−3 °C)");
   assert.equal(typeset("at -5"), "at −5"); // no name
 });

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from labctl.services.planning.plan_answer import describe_plan
-from tests.helpers.browser import MINUS, NARROW, Faults, Service, figure, number_of
+from tests.helpers.browser import MINUS, NARROW, Faults, Service, figure, number_of, on_page
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -65,7 +65,7 @@ def assert_channels_are_chosen(service: Service, page: Page) -> None:
     page.get_by_role("link", name="Choose channels").click()
     card = page.get_by_role("region", name="Channels")
     expect(card.locator(".plot .main-svg").first).to_be_visible()
-    for name in ("set point of the chamber, deg C", "table rate, deg/s", f"{serial}, own temperature, deg C"):
+    for name in ("set point of the chamber, °C", "table rate, deg/s", f"{serial}, own temperature, °C"):
         card.get_by_label(name).uncheck()
     expect(card).to_contain_text("2 of ")
     drawn = "() => Object.fromEntries((document.querySelector('.plot')?.data ?? []).map((t) => [t.name, t]))"
@@ -118,7 +118,7 @@ def test_u_of_a_campaign_is_drawn_against_its_target(service: Service, visit: Ca
 
     card = visit("/campaigns/1").get_by_role("region", name="Uncertainty")
     card.scroll_into_view_if_needed()
-    expect(card).to_contain_text(unit["text"])
+    expect(card).to_contain_text(on_page(unit["text"]))
     plot = card.locator(".plot")
     expect(plot.locator(".main-svg").first).to_be_attached()
     drawn = json.loads(
@@ -146,9 +146,9 @@ def assert_course_is_scrubbed(service: Service, page: Page) -> None:
     assert course["t_s"][at] >= steps["started_s"][step]
     slider = card.get_by_role("slider", name="Time of the campaign")
     slider.fill(str(at))
-    expect(card).to_contain_text(f"{course['chamber_c'][at]:.2f} deg C")
+    expect(card).to_contain_text(f"{course['chamber_c'][at]:.2f} °C")
     (values,) = course["units_c"].values()
-    expect(card).to_contain_text(f"{values[at]:.2f} deg C")
+    expect(card).to_contain_text(f"{values[at]:.2f} °C")
     expect(card).to_contain_text("7: complete")
     (mean,) = (channel["mean"][6] for name, channel in sets["channels"].items() if name.startswith("gyro_"))
     expect(card).to_contain_text(f"{mean:.7g}".rstrip("0").replace("-", MINUS))

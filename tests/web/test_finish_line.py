@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -74,7 +75,7 @@ def test_explore_says_what_its_buttons_do_and_what_an_experiment_can_decide(
     page = visit(f"/explore?unit={unit}&version=1")
     settled(page)
     expect(page.get_by_role("region", name="Verdict")).to_contain_text(
-        "No experiment that this bench can run is expected to name one cause alone"
+        "No experiment that labctl can plan from these data is expected to name one cause alone"
     )
     expect(page.locator("main")).not_to_contain_text("To distinguish them")
     for link in page.get_by_role("navigation", name="On this page").get_by_role("link").all():
@@ -126,6 +127,14 @@ def test_the_error_runs_from_the_one_version_to_the_other_and_ends_green(
         "end => Number(window.counted.at(-1)) === end && window.counted.length > 3",
         arg=shown(after["error"]["rms_dps"]),
     )
+    bar = finish.get_by_role("group", name="RMS error, deg/s, on a logarithmic scale")
+    ticks = bar.locator(".finish-tick")
+    sizes = [float(text) for text in ticks.all_inner_texts()]
+    places = [tick.bounding_box() for tick in ticks.all()]
+    middles = [place["x"] + place["width"] / 2 for place in places if place]
+    steps = [(b - a) / math.log(q / p) for a, b, p, q in zip(middles, middles[1:], sizes, sizes[1:], strict=False)]
+    assert len(steps) > 1
+    assert steps == pytest.approx([steps[0]] * len(steps), rel=0.03)  # a factor is as far wherever it is
     counted = [float(text) for text in page.evaluate("window.counted")]
     assert counted[0] == shown(before["error"]["rms_dps"])
     assert counted == sorted(counted, reverse=True)

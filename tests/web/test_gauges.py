@@ -59,12 +59,12 @@ def test_a_bar_reaches_from_zero_to_the_reading_and_the_mark_is_the_set_point(vi
     page.evaluate(SHOW, [PLAN, reading, 30.0])
     found = shown(page)
     chamber, gyro, rate = found["Chamber"], found["Gyro"], found["Table rate"]
-    assert (chamber["value"], chamber["unit"], chamber["ends"]) == ("25.00", "deg C", ["\u22125", "55"])
+    assert (chamber["value"], chamber["unit"], chamber["ends"]) == ("25.00", "°C", ["\u22125", "55"])
     assert chamber["begin"] == pytest.approx(share(0, -5, 55))
     assert chamber["begin"] + chamber["length"] == pytest.approx(share(25, -5, 55))
     assert mark_of(chamber) == pytest.approx(share(30, -5, 55))
-    assert chamber["note"] == "set point 30 deg C, 5.00 K below"
-    assert (gyro["value"], gyro["note"]) == ("27.12", "set point 30 deg C, 2.88 K below")
+    assert chamber["note"] == "set point 30 °C, 5.00 K below"
+    assert (gyro["value"], gyro["note"]) == ("27.12", "set point 30 °C, 2.88 K below")
     assert (number_of(rate["value"]), rate["unit"], rate["note"]) == (-40.0, "deg/s", "6.67 turns a minute")
     assert rate["begin"] == pytest.approx(share(-40, -100, 100))
     assert rate["begin"] + rate["length"] == pytest.approx(share(0, -100, 100))

@@ -31,8 +31,7 @@ def numbers(card: Locator) -> dict[str, str]:
 
 def levels(text: str) -> list[float]:
     return [
-        number_of(value)
-        for value in re.findall(r"\u2212?\d+(?:\.\d+)?", text.replace("deg/s", "").replace("deg C", ""))
+        number_of(value) for value in re.findall(r"\u2212?\d+(?:\.\d+)?", text.replace("deg/s", "").replace("°C", ""))
     ]
 
 
@@ -77,7 +76,7 @@ def test_points_are_moved_by_mouse_and_keys_and_the_last_request_wins(
     assert step is not None
     page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
     page.mouse.down()
-    for share in (0.2, 0.4, 0.6, 0.75):  # towards the point of 40 deg/s and 35 deg C
+    for share in (0.2, 0.4, 0.6, 0.75):  # towards the point of 40 deg/s and 35 °C
         page.mouse.move(
             box["x"] + box["width"] / 2 + share * (step["x"] - box["x"]),
             box["y"] + box["height"] / 2 + share * (step["y"] - box["y"]),

@@ -8,7 +8,14 @@ from fastapi import APIRouter, Query, Request, Response
 
 from labctl.answers.common_fields import CriticismVerdict
 from labctl.answers.datasheet import DatasheetResponse
-from labctl.answers.units import BatchRequest, BatchResponse, TrendResponse, UnitResponse, UnitState
+from labctl.answers.units import (
+    BatchRequest,
+    BatchResponse,
+    CalibrationEventResponse,
+    TrendResponse,
+    UnitResponse,
+    UnitState,
+)
 from labctl.api.computation import while_connected
 from labctl.api.dependencies import ServiceDep, command_route
 from labctl.api.paging import AfterSerial, Limit, Search, in_parts
@@ -16,7 +23,7 @@ from labctl.services.calibrations.due import span
 from labctl.services.commands.registry import SET_BATCH
 from labctl.services.criticism.trend import trend_unit
 from labctl.services.datasheet.sheet import datasheet
-from labctl.services.units import batches, list_units, unit
+from labctl.services.units import batches, calibration_events, list_units, unit
 from labctl.store.paging import PageRequest
 
 router = APIRouter(prefix="/api", tags=["catalogue"])
@@ -52,6 +59,14 @@ def units(
     now, wanted = service.clock.utc(), PageRequest(search, limit, after)
     within = None if due_within is None else span(due_within)
     return in_parts(request, response, list_units(service.store, now, wanted, within, calibration, verdict, batch))
+
+
+@router.get("/calibration-events", summary="Newest calibrations and certifications")
+def newest_calibration_events(
+    service: ServiceDep, limit: Annotated[int, Query(ge=1, le=1000, description="Largest number of events.")] = 50
+) -> list[CalibrationEventResponse]:
+    """Versions of all units that were made, certified or revoked, the newest event first."""
+    return calibration_events(service.store, limit)
 
 
 @router.get("/batches", summary="All batches")

@@ -38,7 +38,8 @@ def print_uncertainty(answer: UncertaintyResponse) -> None:
         console.print("this rate or temperature was not calibrated: the figures are extrapolated", style="yellow")
     if answer.not_stated:
         console.print(
-            f"uncertainties that the bench does not state, and that U does not contain: {', '.join(answer.not_stated)}",
+            f"uncertainties that are not stated, and that U does not contain: {', '.join(answer.not_stated)}. "
+            f"{answer.not_stated_remedy}".rstrip(),
             style="yellow",
         )
     if answer.overdue:

@@ -246,7 +246,7 @@ class Saturation(Effect):
 
     id = "saturation"
     term = "Saturation (input rate limit)"
-    sentence = "Above a certain rate the output no longer increases with the rate."
+    sentence = "Above a certain rate the output increases less than the rate, in the extreme no longer."
     origin: ClassVar[Origin] = "sensor"
     parameters = (
         Parameter(

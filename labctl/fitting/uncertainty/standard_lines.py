@@ -22,7 +22,9 @@ RAD_PER_DEG = math.pi / 180.0
 #: Quantities whose error is the same at all rates of a campaign, and in proportion to the rate.
 COMMON = frozenset({"clock", "table_rate", "turn_angle"})
 OWN_THERMOMETER = "cancels: the unit's own thermometer is read in the calibration and in use"
-NOT_STATED = "not stated, so its contribution is not in U; add the standard to [[standards]] of the bench file"
+#: The line of the Earth's rate where it is part of the bias.
+EARTH_RATE = "earth_rate"
+NOT_STATED = "not stated, so its contribution is not in U"
 NOT_KEPT = "the version was made by an older version of labctl, which did not store its standards: fit it again"
 NO_TIME_BASE = (
     "not stated, so its contribution is not in U; if the certificate of table_rate includes the time base, "
@@ -237,11 +239,11 @@ def _missing(bench: BenchConditions) -> list[BudgetLine]:
         _unknown(name, NO_TIME_BASE if name == "clock" and bench.of("table_rate") else NOT_STATED) for name in missing
     ]
     if bench.latitude_deg is None and bench.motion != "poses":
-        lines.append(_unknown("earth_rate", NO_LATITUDE))
+        lines.append(_unknown(EARTH_RATE, NO_LATITUDE))
     return lines
 
 
-_UNITS = {"standards": "", "clock": "ppm", "thermometer": "deg C", "chamber_gradient": "deg C", "earth_rate": "deg/s"}
+_UNITS = {"standards": "", "clock": "ppm", "thermometer": "deg C", "chamber_gradient": "deg C", EARTH_RATE: "deg/s"}
 
 
 def _unknown(source: str, reason: str) -> BudgetLine:

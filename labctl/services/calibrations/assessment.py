@@ -91,7 +91,7 @@ def _of_verdict(criticism: CriticismResponse | None, error: CertifiedErrors) -> 
         f"{name} {figure:.4g} deg/s"
         for name, figure in (
             ("RMS error", error.rms_dps),
-            ("held-out", error.heldout_rms_dps),
+            ("on data left out of the fit", error.heldout_rms_dps),
             ("noise floor", error.noise_floor_dps),
         )
         if figure is not None

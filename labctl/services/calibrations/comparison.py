@@ -58,8 +58,8 @@ def worse_than_before(before: Errors, after: Errors) -> list[Finding]:
     first, second = before.heldout_rms_dps, after.heldout_rms_dps
     if first is not None and second is not None and second >= first:
         rises = second > (1.0 + ROUNDING) * first
-        text = f"the held-out RMS error {'rises' if rises else 'does not fall'}: {first:.4g} deg/s before, "
-        findings.append(_of_change(f"{text}{second:.4g} deg/s after", first, second))
+        text = f"the RMS error on data left out of the fit {'rises' if rises else 'does not fall'}"
+        findings.append(_of_change(f"{text}: {first:.4g} deg/s before, {second:.4g} deg/s after", first, second))
     return findings
 
 
@@ -75,10 +75,10 @@ def worse_than_version(other: Errors, errors: Errors) -> str:
     The held-out error decides; where one of them has none, the error of their own data.
     """
     for name, first, second in (
-        ("held-out", other.heldout_rms_dps, errors.heldout_rms_dps),
-        ("RMS", other.rms_dps, errors.rms_dps),
+        ("RMS error on data left out of the fit", other.heldout_rms_dps, errors.heldout_rms_dps),
+        ("RMS error", other.rms_dps, errors.rms_dps),
     ):
         if first is not None and second is not None:
-            text = f"the version's {name} error, {second:.4g} deg/s, is larger than the {first:.4g} deg/s"
+            text = f"the version's {name}, {second:.4g} deg/s, is larger than the {first:.4g} deg/s"
             return text if second > WORSE_VERSION * first else ""
     return ""

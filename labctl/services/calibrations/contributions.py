@@ -73,4 +73,5 @@ def write_figure(answer: UncertaintyResponse, target: Path) -> None:
             f"{target}: the contributions over rate and temperature were not computed; request them with grid = true"
         )
     title = f"{answer.serial}, version {answer.version}: contributions to the uncertainty of a corrected rate"
-    target.write_text(contributions_html(title, grid.contributions, answer.not_stated), encoding="utf-8")
+    page = contributions_html(title, grid.contributions, answer.not_stated, answer.not_stated_remedy)
+    target.write_text(page, encoding="utf-8")

@@ -28,7 +28,7 @@ from labctl.recording import Recording
 from labctl.services.cache import RecentResults, cached
 from labctl.services.calibrations.comparison import worse_than_before
 from labctl.services.calibrations.fitting import days_of, reference_of, several
-from labctl.services.calibrations.next_version import keep_next_version
+from labctl.services.calibrations.next_version import keep_next_version, refuse_taken
 from labctl.services.criticism.evaluation import model_of
 from labctl.services.criticism.measurements import Measurements, measurements_of
 from labctl.services.criticism.residuals import residual_columns
@@ -79,12 +79,13 @@ def improve_unit(store: Store, serial: str, request: ImproveRequest, at: datetim
     """Change a version's effects, fit again, keep it as the next.
 
     Raises NotFound, BadInput, NotEnoughData, DataRefused for data that are certainly wrong and for a result that is
-    worse than no correction.
+    worse than no correction, VersionTaken where the number that the request expects is taken.
     """
+    refuse_taken(store, store.units.get(serial).serial, request.as_version)
     change = _change(store, serial, request)
     job_title = f"change of version {change.row.version} of {serial} on {change.measured.named}"
     refuse_wrong(change.warnings, job_title, accepted=request.accept_warnings)
-    return _keep(store, serial, change, at)
+    return _keep(store, serial, change, at, request.as_version)
 
 
 def preview_unit(store: Store, serial: str, request: ImproveRequest) -> PreviewResponse:
@@ -204,7 +205,7 @@ def _shaped(measured: Measurements, base: ErrorModel, term: Term) -> Term:
     return replace(shape, steady=True) if shape is not None else term
 
 
-def _keep(store: Store, serial: str, change: _Change, at: datetime) -> ImproveResponse:
+def _keep(store: Store, serial: str, change: _Change, at: datetime, expected: int | None) -> ImproveResponse:
     parent, after = change.row.version, change.after
     recording, recordings = change.measured.row.id, change.measured.recordings
     provenance = {
@@ -226,7 +227,8 @@ def _keep(store: Store, serial: str, change: _Change, at: datetime) -> ImproveRe
             parent, recording, after.fitted.model.name, calibration.to_bytes(), calibration.hash, answer, recordings
         )
 
-    return ImproveResponse.model_validate(keep_next_version(store, serial, at, build).answer, extra="forbid")
+    kept = keep_next_version(store, serial, at, build, expected)
+    return ImproveResponse.model_validate(kept.answer, extra="forbid")
 
 
 def plausible(result: FitResult, technology: str) -> dict[str, UsualRange]:

@@ -40,7 +40,8 @@ from labctl.fitting.uncertainty.largest_error import widening
 from labctl.fitting.uncertainty.vector_bound import PLACES
 from labctl.services.calibrations.contributions import contributions_over
 from labctl.services.criticism.versions import version_of
-from labctl.store import Store
+from labctl.services.standards.where_stated import remedy_of_unstated, were_imported
+from labctl.store import CalibrationRecord, Store
 
 
 def uncertainty_at(
@@ -50,8 +51,9 @@ def uncertainty_at(
 
     `rate_dps` is one rate, about one axis after the other, or a rate vector about x, y and z.
     """
-    document, _ = store.calibrations.document(serial, version)
-    return uncertainty_answer(read_calibration(document), rate_dps, temperature_c, grid=grid)
+    row = store.calibrations.get(serial, version)
+    answer = uncertainty_answer(read_calibration(row.document), rate_dps, temperature_c, grid=grid)
+    return _with_remedy(store, row, answer)
 
 
 def uncertainty_of_unit(
@@ -67,15 +69,25 @@ def uncertainty_of_unit(
 
     Raises NotFound, BadInput, NotEnoughData.
     """
-    calibration = read_calibration(version_of(store, serial, version).document)
+    row = version_of(store, serial, version)
+    calibration = read_calibration(row.document)
     covered = Covered(calibration.rate_dps, calibration.temperature_c)
     rates, temperatures_c = covered.rates(_Known.of(calibration).evidence), covered.temperatures()
-    return uncertainty_answer(
+    answer = uncertainty_answer(
         calibration,
         [max(rates) / 2] if rate_dps is None else rate_dps,
         temperatures_c[len(temperatures_c) // 2] if temperature_c is None else temperature_c,
         grid=grid,
     )
+    return _with_remedy(store, row, answer)
+
+
+def _with_remedy(store: Store, row: CalibrationRecord, answer: UncertaintyResponse) -> UncertaintyResponse:
+    """Return an answer that says where the standards are stated that are missing in U of a version."""
+    if not answer.not_stated:
+        return answer
+    imported = were_imported([store.recordings.get(number) for number in row.recordings])
+    return answer.model_copy(update={"not_stated_remedy": remedy_of_unstated(answer.not_stated, imported=imported)})
 
 
 @single_threaded

@@ -8,11 +8,13 @@ from instruments.bench_config import BenchFile
 from labctl.answers.campaigns import CampaignResponse
 from labctl.services.benches.driving_process import whereabouts
 from labctl.store import ResumePoint, Store
+from labctl.texts import NO_BENCH
 from procedures.contracts.campaign_state import CampaignState
 
 #: A campaign that was resumed so often without finishing a step needs a person.
 MAX_RESUMES = 5
-NO_BENCH = "this service has no bench; start a service on the bench of the campaign, or run `labctl campaign resume`"
+#: Why a campaign cannot be resumed here, and where it can.
+RESUME_ELSEWHERE = f"{NO_BENCH}; start a service on the bench of the campaign, or run `labctl campaign resume`"
 
 
 def retries_exhausted(standing: ResumePoint) -> str | None:

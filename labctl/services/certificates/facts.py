@@ -15,10 +15,11 @@ from labctl.services.certificates import remedies
 from labctl.services.certificates.missing import MissingFact, of_contact
 from labctl.services.certificates.sensors import Sensors, missing_of
 from labctl.services.standards.usage import performed
+from labctl.services.standards.where_stated import place_of_standards
 from labctl.store import CalibrationRecord, CampaignRow, CertificationRow, RecordingRow, Store
 
-BENCH = "[laboratory] of the bench file of the campaign, or [laboratory] of the order"
-STANDARDS = "[[standards]] of the bench file before the campaign, or of recording.toml"
+ORDER = "[laboratory] of the order"
+BENCH = f"[laboratory] of the bench file of the campaign, or {ORDER}"
 #: Quantities that a rate, or an angle over a time, is known from.
 RATE = frozenset({"clock", "table_rate", "turn_angle"})
 
@@ -70,7 +71,7 @@ class Facts:
         if not self.order.item.condition.strip():
             yield MissingFact("item's condition", "[item] of the order", "item", "condition")
         if not self.calibration.document["unit"]["model"]:
-            where = "model of [[gyros]] of the bench file, or of recording.toml"
+            where = "model of recording.toml" if self.imported else "model of [[gyros]] of the bench file"
             yield MissingFact("item's model", where, remedy=remedies.of_model(self.imported))
         if not self.recordings:
             where = f"`labctl fit {self.row.serial}` on one"
@@ -86,8 +87,12 @@ class Facts:
 
     def _laboratory(self) -> Iterator[MissingFact]:
         """Yield what is missing of the laboratory; the order states none beside that of the bench file."""
-        for fact in of_contact(self.laboratory, "laboratory", BENCH):
-            yield fact._replace(table=None, key="", remedy=remedies.LABORATORY) if self.names_laboratory else fact
+        later = "" if self.imported else remedies.LATER
+        for fact in of_contact(self.laboratory, "laboratory", ORDER if self.imported else BENCH):
+            if self.names_laboratory:
+                yield fact._replace(table=None, key="", remedy=remedies.LABORATORY)
+            else:
+                yield fact._replace(remedy=later)
 
     def _authorisation(self) -> Iterator[MissingFact]:
         certify = f"`labctl certify {self.row.serial} {self.row.version}"
@@ -102,11 +107,11 @@ class Facts:
             )
 
     def _traceability(self) -> Iterator[MissingFact]:
-        remedy = remedies.of_standards(self.imported)
+        remedy, where = remedies.of_standards(self.imported), place_of_standards(imported=self.imported)
         if self.standards and not {standard.quantity for standard in self.standards} & RATE:
-            yield MissingFact("standard of the rate", STANDARDS, remedy=remedy)
+            yield MissingFact("standard of the rate", where, remedy=remedy)
         if not self.standards:
-            yield MissingFact("reference standards", STANDARDS, remedy=remedy)
+            yield MissingFact("reference standards", where, remedy=remedy)
         measured = any(standard.quantity in RATE and standard.certificate for standard in self.standards)
         for standard in self.standards:
             if standard.quantity in RATE and measured and not standard.certificate:
@@ -114,7 +119,7 @@ class Facts:
             lacking = [name for name in ("certificate", "issued_by", "due") if not getattr(standard, name)]
             if lacking and not standard.traceability:
                 what = f"{', '.join(lacking)} (or traceability) of standard {standard.label}"
-                yield MissingFact(what, STANDARDS, remedy=remedy)
+                yield MissingFact(what, where, remedy=remedy)
 
 
 def facts_of(store: Store, serial: str, version: int, order: CertificateOrder) -> Facts:

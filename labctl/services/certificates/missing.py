@@ -21,7 +21,7 @@ class MissingFact(NamedTuple):
     where: str  #: where to state it, in words
     table: OrderTable | None = None  #: the table of the order that can state it; None: the order cannot
     key: str = ""  #: its key in that table
-    remedy: str = ""  #: what a person does where the order cannot state it, in a sentence
+    remedy: str = ""  #: what a person does where the order cannot, or need not, state it; a sentence
 
 
 class MissingFacts(BadInput):

@@ -10,10 +10,12 @@ from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.unattended import record_action
 from labctl.services.commands.context import BenchAct, CommandContext, LiveControl, RequestT, ResponseT
 from labctl.services.commands.requests import CampaignStart
+from labctl.texts import NO_BENCH
 
 log = get_logger()
 
-NO_BENCH = "this service has no bench; start it with `labctl serve --bench FILE` or `--simulate`"
+#: Why an act of a bench is refused, and how a service gets a bench.
+WITHOUT_BENCH = f"{NO_BENCH}; start it with `labctl serve --bench FILE` or `--simulate`"
 
 
 class ServiceControl:
@@ -25,7 +27,7 @@ class ServiceControl:
     def bench_runner(self) -> BenchRunner:
         """Return the runner of this service's bench. Raises Conflict when it has none."""
         if self.runner is None:
-            raise Conflict(NO_BENCH)
+            raise Conflict(WITHOUT_BENCH)
         return self.runner
 
     def bench_of(self, _: CampaignStart) -> BenchFile:

@@ -130,8 +130,8 @@ def to_distinguish(effects: Sequence[str], experiments: Sequence[Experiment]) ->
         return [f"To distinguish them: {first['do']}."]
     share = first["information_bit"] / first["open_bit"]
     text = (
-        "No experiment that this bench can run is expected to name one cause alone; this one tells most about how "
-        f"probable each effect is, {probability_text(share)} of the missing information: {first['do']}."
+        "No experiment that labctl can plan from these data is expected to name one cause alone; this one tells "
+        f"most about how probable each effect is, {probability_text(share)} of the missing information: {first['do']}."
     )
     return [text]
 

@@ -235,7 +235,7 @@ def _why(foreseen: Foreseen, question: OpenQuestion, of: int) -> str:
         f"{foreseen.bit_per_h:.2g} bit/h with set-up and a person's time"
     )
     order = _ORDER[foreseen.rank[0] > 0]
-    rank = f"; {of} experiments that this bench can run are ordered by {order}" if of > 1 else ""
+    rank = f"; {of} experiments that labctl can plan from these data are ordered by {order}" if of > 1 else ""
     listed = ", ".join(told[:NAMED]) + (f" and {len(told) - NAMED} more" if len(told) > NAMED else "")
     pair = f"; if it is {leader}, this distinguishes it from {listed}" if told and foreseen.rank[0] > 0 else ""
     return f"{first}{rank}{pair}; {_naming_text(foreseen, question)}."

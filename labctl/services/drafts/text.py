@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from labctl.answers.drafts import DraftReport, LimitResult
 
 LIMITS = {
-    "heldout_rms_dps": "held-out error",
+    "heldout_rms_dps": "error on data left out of the fit",
     "max_error_dps": "largest error",
     "drift_dps": "drift from the version in force",
 }
@@ -20,13 +20,15 @@ def report_text(serial: str, version: int, report: DraftReport) -> str:
 
 def _sentences(serial: str, version: int, report: DraftReport) -> Iterator[str]:
     error = report.error
-    heldout = "" if error.heldout_rms_dps is None else f", held-out {error.heldout_rms_dps:.3g} deg/s"
+    left_out = error.heldout_rms_dps
+    heldout = "" if left_out is None else f", on data left out of the fit {left_out:.3g} deg/s"
     error_text = "not known" if error.rms_dps is None else f"{error.rms_dps:.3g} deg/s RMS"
     yield f"Draft calibration: version {version} of {serial} ({report.model}), error {error_text}{heldout}."
     if report.verdict is not None:
         yield f"Verdict: {report.verdict}."
     if report.smallest_heldout is not None and report.smallest_heldout != report.model:
-        yield f"Of the models compared, {report.smallest_heldout} has a clearly smaller held-out error."
+        best = report.smallest_heldout
+        yield f"Of the models compared, {best} has a clearly smaller error on data left out of the fit."
     if report.as_found is not None:
         yield f"As found (version {report.as_found.version}): {report.as_found.rms_dps:.3g} deg/s RMS."
     if report.as_left is not None:

@@ -25,7 +25,7 @@ from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.listeners import ChangeListeners
 from labctl.services.commands.command import LocalExecutor
 from labctl.services.commands.context import CommandContext
-from labctl.services.commands.service_control import NO_BENCH, ServiceControl
+from labctl.services.commands.service_control import WITHOUT_BENCH, ServiceControl
 from labctl.services.live.assessor import BackgroundAssessor, InlineAssessor
 from labctl.services.live.feeds import network_feed
 from labctl.services.live.gyro_source import GyroSource
@@ -129,7 +129,7 @@ class LiveSessions:
         else:
             runner = self._runner
             if runner is None:
-                raise Conflict(f"{NO_BENCH}; name the address of a stream")
+                raise Conflict(f"{WITHOUT_BENCH}; name the address of a stream")
             serial = request.serial or runner.bench.gyros[0].serial
             runner.lend(serial, self._end_and_wait, partial(self._open_bench, request, target, runner))
         answer = self.state()

@@ -26,6 +26,7 @@ export type BenchCheck = Schema<"BenchCheckResponse">;
 export type BenchStatus = Schema<"BenchStatus">;
 export type Budget = Schema<"BudgetJson">;
 export type BudgetLine = Schema<"BudgetLineJson">;
+export type CalibrationEvent = Schema<"CalibrationEventResponse">;
 export type CalibrationRow = Schema<"CalibrationRow">;
 export type Campaign = Schema<"CampaignResponse">;
 export type CampaignPlan = Schema<"CampaignPlanResponse">;

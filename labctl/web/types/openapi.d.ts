@@ -565,6 +565,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/calibration-events": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Newest calibrations and certifications
+         * @description Versions of all units that were made, certified or revoked, the newest event first.
+         */
+        get: operations["newest_calibration_events_api_calibration_events_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/batches": {
         parameters: {
             query?: never;
@@ -4344,6 +4364,44 @@ export interface components {
              * @description Why a number is null or 0, or how it was evaluated.
              */
             why: string;
+        };
+        /**
+         * CalibrationEventResponse
+         * @description A version of a unit that was made, or that was certified or revoked.
+         */
+        CalibrationEventResponse: {
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
+            serial: string;
+            /**
+             * Version
+             * @description Number of the calibration version, counted from 1 for each unit.
+             */
+            version: number;
+            /**
+             * Act
+             * @description made: it was fitted, or changed from another version; certify, revoke: it was certified, or its certification revoked.
+             * @enum {string}
+             */
+            act: "made" | "certify" | "revoke";
+            /**
+             * At
+             * Format: date-time
+             * @description Time of the event.
+             */
+            at: string;
+            /**
+             * By
+             * @description Person who certified or revoked it; empty for a version that was made.
+             */
+            by: string;
+            /**
+             * Model
+             * @description Name of the error model.
+             */
+            model: string;
         };
         /**
          * CalibrationRow
@@ -9937,6 +9995,11 @@ export interface components {
              * @default false
              */
             accept_warnings?: boolean;
+            /**
+             * As Version
+             * @description Number that the new version is expected to have. Where another one has it already, nothing is made (409): two requests of the same page make one version. Default: the next number.
+             */
+            as_version?: number | null;
         };
         /**
          * ImproveResponse
@@ -11845,7 +11908,7 @@ export interface components {
             key: string;
             /**
              * Remedy
-             * @description What a person does where the order cannot state it, in a sentence; else empty.
+             * @description What a person does where the order cannot state it, or has later certificates state it, in a sentence; else empty.
              * @default
              */
             remedy: string;
@@ -16401,9 +16464,15 @@ export interface components {
             };
             /**
              * Not Stated
-             * @description Reference standards whose uncertainty the bench file does not state; U does not contain their contributions.
+             * @description Reference standards whose uncertainty is not stated; U does not contain their contributions.
              */
             not_stated: string[];
+            /**
+             * Not Stated Remedy
+             * @description What brings them into U, by where the measurements came from: their place in the bench file, or in the files of the import. Empty: all are stated.
+             * @default
+             */
+            not_stated_remedy: string;
             /**
              * Overdue
              * @description Whether a standard was past its due date when it was used.
@@ -16460,6 +16529,11 @@ export interface components {
              * @default
              */
             supplier: string;
+            /**
+             * Axes
+             * @description Output axes of the newest recording; empty: there is no recording, or the response lists units.
+             */
+            axes: ("x" | "y" | "z")[];
             /**
              * Recordings
              * @description Numbers of the unit's recordings.
@@ -18018,6 +18092,38 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["UnitResponse"][];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    newest_calibration_events_api_calibration_events_get: {
+        parameters: {
+            query?: {
+                /** @description Largest number of events. */
+                limit?: number;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CalibrationEventResponse"][];
                 };
             };
             /** @description Validation Error */

@@ -173,7 +173,8 @@ def test_which_verdicts_speak_against_a_version(
     assert (known.verdict, known.override_needed) == (verdict, refused)
     if refused:
         # the figures are those of the version, which the answer has too, and not of its model refitted for the verdict
-        stated = f"(RMS error {known.error.rms_dps:.4g} deg/s, held-out {known.error.heldout_rms_dps:.4g} deg/s, noise "
+        stated = f"(RMS error {known.error.rms_dps:.4g} deg/s, on data left out of the fit "
+        stated += f"{known.error.heldout_rms_dps:.4g} deg/s, noise "
         assert stated + f"floor {known.error.noise_floor_dps:.4g} deg/s): So it is" in known.objections[0]["text"]
 
 

@@ -6,6 +6,7 @@ import json
 import threading
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
@@ -64,6 +65,32 @@ def test_a_fit_ends_when_other_fits_keep_taking_its_number(store: Store) -> None
     with pytest.raises(VersionTaken, match="was made by another fit in the meantime; fit again"):
         keep_next_version(store, "G-1", AT, slow)
     assert len(store.calibrations.versions("G-1")) == TRIES
+
+
+def test_a_version_that_is_expected_under_a_taken_number_is_not_made(store: Store) -> None:
+    """Two tabs make the same version: the second is refused, before it fits and also while it fits."""
+    keep_next_version(store, "G-1", AT, calibration, 1)
+    for expected in (1, 3):
+        with pytest.raises(VersionTaken):
+            keep_next_version(store, "G-1", AT, calibration, expected)
+
+    def slow(version: int) -> NewCalibration:
+        store.calibrations.add("G-1", AT, version, calibration(version))
+        return calibration(version)
+
+    with pytest.raises(
+        VersionTaken, match=r"^G-1 version 2 exists already: m, made by a fit at .* make version 3 beside"
+    ):
+        keep_next_version(store, "G-1", AT, slow, 2)
+    assert store.calibrations.versions("G-1") == [1, 2]
+
+
+def test_the_newest_events_of_all_units_are_versions_and_acts(store: Store) -> None:
+    for version in (1, 2):
+        store.calibrations.add("G-1", AT + timedelta(hours=version), version, calibration(version))
+    store.calibrations.certify("G-1", 1, "certify", by="Ann", reason="fits", at=AT + timedelta(hours=3))
+    events = [(each.serial, each.version, each.act, each.by) for each in store.calibration_events.newest(2)]
+    assert events == [("G-1", 1, "certify", "Ann"), ("G-1", 2, "made", "")]
 
 
 def test_a_number_that_another_process_takes_between_look_and_write(

@@ -190,7 +190,8 @@ def test_an_improvement_that_does_not_predict_better_says_so_loudly(
     brought_in(single_axis(1))
     lab.run("fit", FOG, "--effects", "bias,scale_factor,bias_temperature:2")
     printed = lab.run("improve", FOG, "--remove", "bias_temperature").stdout
-    assert printed.startswith("check: change: the held-out RMS error rises: 0.349 deg/s before, 0.3512 deg/s after")
+    rises = "the RMS error on data left out of the fit rises"
+    assert printed.startswith(f"check: change: {rises}: 0.349 deg/s before, 0.3512 deg/s after")
     stored = lab.json("improve", FOG, "--version", "1", "--remove", "bias_temperature")
     assert [each["where"] for each in stored["warnings"]] == ["change"]
 
@@ -199,6 +200,6 @@ def test_a_change_that_makes_held_out_temperatures_worse_is_said() -> None:
     assert worse_than_before(figures(1, 0.036, 0.036), figures(1, 0.03, 0.035)) == []
     (worse,) = worse_than_before(figures(1, 0.036, 0.036), figures(1, 0.03, 0.134))
     assert worse.severity == "likely"
-    assert "the held-out RMS error rises: 0.036 deg/s before, 0.134 deg/s after" in worse.text
+    assert "the RMS error on data left out of the fit rises: 0.036 deg/s before, 0.134 deg/s after" in worse.text
     (same,) = worse_than_before(figures(1, 0.036, 0.036), figures(1, 0.03, 0.036))
-    assert "the held-out RMS error does not fall" in same.text
+    assert "the RMS error on data left out of the fit does not fall" in same.text

@@ -200,8 +200,8 @@ def test_the_experiment_in_words_is_the_first_of_the_list() -> None:
     said = sentences(reported, [asked | {"power": 0.05}, {"do": "another"}])  # not expected to decide
     assert not any(line.startswith("To distinguish") for line in said)
     assert (
-        "No experiment that this bench can run is expected to name one cause alone; this one tells most about how "
-        "probable each effect is, 25 % of the missing information: the rates in random order."
+        "No experiment that labctl can plan from these data is expected to name one cause alone; this one tells "
+        "most about how probable each effect is, 25 % of the missing information: the rates in random order."
     ) in said
 
 

@@ -77,8 +77,8 @@ export function gauges(timeline) {
   const warm = timeline.temperature_c.filter((value) => value !== null);
   const most = Math.max(1, ...timeline.rate_dps.map((value) => Math.abs(value ?? 0)));
   const [low, high] = warm.length ? [Math.min(...warm, 20) - MARGIN_C, Math.max(...warm, 30) + MARGIN_C] : [0, 50];
-  const chamber = gauge("Chamber", "deg C", low, high, 2);
-  const gyro = gauge("Gyro", "deg C", low, high, 2);
+  const chamber = gauge("Chamber", "°C", low, high, 2);
+  const gyro = gauge("Gyro", "°C", low, high, 2);
   const rate = gauge("Table rate", "deg/s", -most, most, 3);
   const driven = timeline.kind.includes("home"); // a bench on which units are turned by hand has neither
   const references = h("p", { class: "gauge-note", hidden: true });
@@ -92,7 +92,7 @@ export function gauges(timeline) {
     if (!isNumber(value)) return "no reading yet";
     if (!isNumber(target)) return driven ? "no set point yet" : "by its own thermometer";
     const off = `${Math.abs(value - target).toFixed(2)} K ${value > target ? "above" : "below"}`;
-    return `set point ${plainNumber(target)} deg C, ${Math.abs(value - target) < 0.005 ? "there" : off}`;
+    return `set point ${plainNumber(target)} °C, ${Math.abs(value - target) < 0.005 ? "there" : off}`;
   };
   /**
    * @param {Pick<Campaign, "chamber_c" | "gyro_c" | "rate_dps" | "references">} status

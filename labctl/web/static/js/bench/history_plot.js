@@ -26,7 +26,7 @@ export function historyPlot(history) {
       x,
       y: values,
       line: { color: colour(shade), width: 1.8, ...more.line },
-      hovertemplate: `%{y:.5~g} ${more.unit ?? "deg C"}<extra>${name}</extra>`,
+      hovertemplate: `%{y:.5~g} ${more.unit ?? "°C"}<extra>${name}</extra>`,
       ...more.trace,
     });
     return {
@@ -44,7 +44,7 @@ export function historyPlot(history) {
         margin: { l: 76, r: 12, t: 34, b: 42 },
         hovermode: "x unified",
         xaxis: { title: { text: `time of the campaign, ${unit.name}` }, anchor: "y2" },
-        yaxis: { title: { text: "temperature,<br>deg C" }, domain: [0.42, 1] },
+        yaxis: { title: { text: "temperature,<br>°C" }, domain: [0.42, 1] },
         yaxis2: { title: { text: "table rate,<br>deg/s" }, domain: [0, 0.34], anchor: "x" },
       },
     };

@@ -3,6 +3,7 @@
 import { h, uniqueId } from "../core/elements.js";
 import { percent } from "../core/format.js";
 import { card, factList, notice, readOnlyNote } from "../core/components.js";
+import { NO_BENCH, WITH_BENCH } from "../core/no_bench.js";
 import { presentWords } from "../core/freshness/line.js";
 import { adviceNotice } from "../campaigns/advice.js";
 import { attendanceNotice } from "../campaigns/attendance.js";
@@ -17,14 +18,14 @@ import { linkButton, resumeControl } from "./actions.js";
 
 export function noBenchCard() {
   return card(
-    "This service drives no bench",
+    NO_BENCH,
     readOnlyNote("No bench is driven from here"),
     h(
       "p",
       { class: "act" },
       "The service serves calibrations and imports recordings. To run a bench, start the service with one of these commands:",
     ),
-    h("pre", { class: "command act" }, "labctl serve --simulate\nlabctl serve --bench FILE"),
+    h("pre", { class: "command act" }, `${WITH_BENCH.simulated}\n${WITH_BENCH.real}`),
     h(
       "p",
       { class: "muted act" },

@@ -89,7 +89,7 @@ export function lastDataset(timeline, signal) {
       setChildren(
         about,
         h("a", { href: `/recordings/${recording}?dataset=${dataset}` }, `Data set ${dataset}`),
-        `: ${plainNumber(timeline.rate_dps[k])} deg/s at ${plainNumber(timeline.temperature_c[k])} deg C, ${timeline.position[k] ?? "?"} up`,
+        `: ${plainNumber(timeline.rate_dps[k])} deg/s at ${plainNumber(timeline.temperature_c[k])} °C, ${timeline.position[k] ?? "?"} up`,
       );
       if (!picture.isConnected) setChildren(place, picture);
       picture.redraw();

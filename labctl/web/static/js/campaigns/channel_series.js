@@ -45,7 +45,7 @@ export const allSeries = (course, steps, measured) => [
 const environment = (course, id, name, values, drawn = "line") => ({
   id,
   name,
-  unit: "deg C",
+  unit: "°C",
   t_s: [...course.t_s],
   values: [...values],
   drawn,

@@ -65,7 +65,7 @@ export function courseCard(course, plan, datasets, moved) {
       x,
       y,
       line: { color: colour(shade), width: 1.6, ...line },
-      hovertemplate: `%{y:.2f} deg C<extra>${name}</extra>`,
+      hovertemplate: `%{y:.2f} °C<extra>${name}</extra>`,
     });
     return {
       data: [
@@ -77,7 +77,7 @@ export function courseCard(course, plan, datasets, moved) {
       layout: {
         margin: { l: 76, r: 12, t: 34, b: 42 },
         xaxis: { title: { text: `time of the campaign, ${unit.name}` }, anchor: datasets ? "y2" : "y" },
-        yaxis: { title: { text: "temperature,<br>deg C" }, domain: datasets ? [0.42, 1] : [0, 1] },
+        yaxis: { title: { text: "temperature,<br>°C" }, domain: datasets ? [0.42, 1] : [0, 1] },
         ...(datasets ? { yaxis2: { title: { text: outputTitle(datasets) }, domain: [0, 0.34], anchor: "x" } } : {}),
         shapes: [
           {
@@ -167,7 +167,7 @@ function twoSoaks(course, plan) {
   if (soaks.length < 2) return null;
   const chosen = [0, soaks.length - 1];
   /** @param {number} k */
-  const name = (k) => `soak of step ${soaks[k].number} at ${plainNumber(soaks[k].temperature_c ?? NaN)} deg C`;
+  const name = (k) => `soak of step ${soaks[k].number} at ${plainNumber(soaks[k].temperature_c ?? NaN)} °C`;
   const draw = () => ({
     data: chosen.flatMap((k, which) =>
       [

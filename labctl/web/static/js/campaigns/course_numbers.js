@@ -58,7 +58,7 @@ export function readingsAt({ course, steps, datasets }, t_s) {
   const step = stepAt(steps, t_s);
   const dataset = step === null ? null : steps.dataset[step];
   /** @param {number | null | undefined} value */
-  const warm = (value) => (typeof value === "number" ? `${fixed(value, 2)} deg C` : "–");
+  const warm = (value) => (typeof value === "number" ? `${fixed(value, 2)} °C` : "–");
   /** @type {[string, string][]} */
   const rows = [
     ["Time", duration(t_s)],

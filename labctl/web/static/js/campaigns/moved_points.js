@@ -127,7 +127,7 @@ function outcome(now, first) {
     ["RMS U, k = 2", number(evaluated.u_rms_dps), "deg/s", before ? `as it was: ${number(before.u_rms_dps)}` : null],
     ["Data sets", count(evaluated.datasets)],
     ["Rates", now.rates_dps.map((rate) => plainNumber(rate)).join(", "), "deg/s"],
-    ["Temperatures", now.temperatures_c.map((warm) => plainNumber(warm)).join(", "), "deg C"],
+    ["Temperatures", now.temperatures_c.map((warm) => plainNumber(warm)).join(", "), "°C"],
   ]);
 }
 

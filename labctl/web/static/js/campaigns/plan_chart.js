@@ -57,7 +57,7 @@ export function planChart(name, give, { height = "24rem", pick } = {}) {
       const middles = here.map((step) => (step.from + step.until) / 2);
       const texts = here.map(
         (step) =>
-          `data set ${step.dataset}: ${byHand ? `${plainNumber(step.turn)} deg by hand` : `${plainNumber(step.rate)} deg/s at ${plainNumber(step.warm)} deg C`}, ${step.position ?? "?"} up<br>${live ? `${state}, ` : ""}begins after ${duration(step.from * unit_s)}, takes ${duration((step.until - step.from) * unit_s)}`,
+          `data set ${step.dataset}: ${byHand ? `${plainNumber(step.turn)} deg by hand` : `${plainNumber(step.rate)} deg/s at ${plainNumber(step.warm)} °C`}, ${step.position ?? "?"} up<br>${live ? `${state}, ` : ""}begins after ${duration(step.from * unit_s)}, takes ${duration((step.until - step.from) * unit_s)}`,
       );
       /** @type {PlotTrace} */
       const common = {
@@ -170,7 +170,7 @@ export function planChart(name, give, { height = "24rem", pick } = {}) {
           anchor: "y2",
           range: [-0.01 * end, Math.max(end, (now_s || 0) / unit_s) * 1.01],
         },
-        yaxis: byHand ? { visible: false } : { title: { text: "set point, deg C" }, domain: [0.46, 1] },
+        yaxis: byHand ? { visible: false } : { title: { text: "set point, °C" }, domain: [0.46, 1] },
         yaxis2: byHand
           ? { title: { text: "turn, deg" }, domain: [0, 1], anchor: "x" }
           : { title: { text: "rate, deg/s" }, domain: [0, 0.38], anchor: "x" },

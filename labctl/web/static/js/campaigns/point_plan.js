@@ -14,7 +14,7 @@ const PHONE_PX = 760;
 /** Steps of Page Up and Page Down, and of an arrow with Shift. */
 const LARGE = 10;
 const NAMES = { rates: "Rate", temperatures: "Temperature" };
-const UNITS = { rates: "deg/s", temperatures: "deg C" };
+const UNITS = { rates: "deg/s", temperatures: "°C" };
 /** @type {Record<string, number>} */
 const KEYS = {
   ArrowRight: 1,
@@ -154,7 +154,7 @@ export function pointPlan(levels, shown, use, moved) {
     ...ends("rates").flatMap((value) => label(value, x(value), HEIGHT - 6, "middle")),
     ...ends("temperatures").flatMap((value) => label(value, LEFT - 28, y(value) + 4, "end")),
     word("rate, deg/s", (LEFT + width - RIM) / 2, HEIGHT - 6, "middle"),
-    word("deg C", LEFT - 28, RIM + 2, "end"),
+    word("°C", LEFT - 28, RIM + 2, "end"),
     points,
     levels.rates.map((_, k) => handle("rates", k)),
     levels.temperatures.map((_, k) => handle("temperatures", k)),

@@ -6,6 +6,7 @@ import { setChildren, h } from "../core/elements.js";
 import { instant } from "../core/format.js";
 import { actButton, card, notice, readOnlyNote, toast } from "../core/components.js";
 import { labelledField, toggleGroup } from "../core/fields.js";
+import { NO_BENCH } from "../core/no_bench.js";
 import { navigate } from "../core/router.js";
 import { askBenchClear } from "../bench/actions.js";
 import { attendanceNotice, wallText } from "./attendance.js";
@@ -177,7 +178,7 @@ export function startForm(bench, order) {
     h(
       "div",
       { class: "stack act" },
-      bench ? null : notice("", "This service drives no bench; a campaign that is planned here can be simulated."),
+      bench ? null : notice("", `${NO_BENCH}; a campaign that is planned here can be simulated.`),
       h("div", {}, group),
       attended,
       place,

@@ -79,7 +79,7 @@ export function temperatureColours(temperatures, barMore) {
   const [low, high] = span(temperatures);
   /** @param {number} value */
   const of = (value) => colourAt(TEMPERATURE_SCALE, high > low ? (value - low) / (high - low) : 0.5);
-  return { of, axis: { colorscale: TEMPERATURE_SCALE, cmin: low, cmax: high, colorbar: bar("deg C", barMore) } };
+  return { of, axis: { colorscale: TEMPERATURE_SCALE, cmin: low, cmax: high, colorbar: bar("°C", barMore) } };
 }
 
 /**

@@ -1,6 +1,7 @@
 // CSV files of figures.
 
 import { MINUS } from "./rounding.js";
+import { withoutCelsius } from "./typeset.js";
 
 /** @import { CsvRows, PlotLayout, PlotTrace } from "../../../types/pages.js" */
 
@@ -15,11 +16,11 @@ export const fileName = (name) =>
     .replaceAll(/^-|-$/g, "");
 
 /**
- * A cell as text; its numbers have the sign that programs read, also where the page wrote them as labels.
+ * A cell as text; its numbers and units have the signs that programs read, also where the page wrote them as labels.
  * @param {unknown} cell
  */
 function cellText(cell) {
-  const text = String(cell ?? "").replaceAll(MINUS, "-");
+  const text = withoutCelsius(String(cell ?? "").replaceAll(MINUS, "-"));
   return /[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
 }
 

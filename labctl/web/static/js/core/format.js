@@ -154,17 +154,18 @@ export const idText = (id) => String(id).replaceAll("_", " ");
 
 /**
  * A sentence of the service with effects as the links beside it name them: "scale factor odd", not "scale_factor_odd".
- * A command between backticks keeps the ids, which it needs. A title in brackets that says the same again is left out.
+ * A command between backticks keeps the ids, which it needs. A title in brackets that begins with the same
+ * words again is left out as far as it does.
  * @param {string} text
  * @param {Iterable<string>} ids of effects
  */
 export function inWords(text, ids) {
   const compound = [...new Set(ids)].filter((id) => id.includes("_"));
   if (!compound.length) return text;
-  const whole = new RegExp(`(?<![\\w-])(${compound.join("|")})(?![\\w-])( \\(([^()]*)\\))?`, "g");
+  const whole = new RegExp(`(?<![\\w-])(${compound.join("|")})(?![\\w-])( \\(((?:[^()]|\\([^()]*\\))*)\\))?`, "g");
   /** @type {(match: string, id: string, brackets?: string, title?: string) => string} */
   const named = (_, id, brackets = "", title = "") =>
-    title.toLowerCase() === idText(id) ? idText(id) : idText(id) + brackets;
+    title.toLowerCase().startsWith(idText(id)) ? idText(id) + title.slice(id.length) : idText(id) + brackets;
   return text
     .split("`")
     .map((part, k) => (k % 2 ? part : part.replaceAll(whole, named)))

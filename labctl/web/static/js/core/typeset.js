@@ -29,13 +29,21 @@ const UNBROKEN = /(?<=\d) %|(?<=(^|[\s(])[<>]) (?=\d)|(?<=×) (?=10)|(?<=\d) (?=
  */
 const [PLUS_MINUS, NEGATIVE] = [/\+-(?=\s*\d)/g, /(?<![\w-])-(?=\d|[xyz]\b)/g];
 
+/** Degrees Celsius as the service and the commands write them, and as a page does. */
+const [ASCII_CELSIUS, CELSIUS] = ["deg C", "°C"];
 /**
- * A text with the minus sign, ± and powers: "+-90 deg/s, -5e-05 K^-1" is "±90 deg/s, −5 × 10⁻⁵ K⁻¹". Names that people
- * have given stay as they are.
+ * A text of a page as a file has it, for programs.
+ * @param {string} text
+ */
+export const withoutCelsius = (text) => text.replaceAll(CELSIUS, ASCII_CELSIUS);
+
+/**
+ * A text with the minus sign, ±, powers and °C: "+-90 deg/s, -5e-05 K^-1" is "±90 deg/s, −5 × 10⁻⁵ K⁻¹". Names that
+ * people have given stay as they are.
  * @param {string} text
  */
 export function typeset(text) {
-  if (!/-|e\+|\^|[%<>×±]/.test(text)) return text;
+  if (!/-|e\+|\^|[%<>×±]|deg C/.test(text)) return text;
   return splitAtNames(text)
     .map((part, k) => (k % 2 ? part : withSigns(part)))
     .join("");
@@ -44,6 +52,7 @@ export function typeset(text) {
 /** @param {string} text */
 function withSigns(text) {
   return text
+    .replaceAll(ASCII_CELSIUS, CELSIUS)
     .replace(POWER, (_, factor, sign, power) => `${factor} × 10${superscript(sign + power)}`)
     .replace(RAISED, (_, power) => superscript(power))
     .replace(PLUS_MINUS, "±")

@@ -11,7 +11,7 @@ import { finishLine, stepOf } from "./finish_line.js";
 import { heldOutName } from "./first_models.js";
 import { errorOn } from "./ladder_error.js";
 import { ticksOf } from "../core/log_ticks.js";
-import { colourLimit, hasMap, mapsOf } from "./residual_cells.js";
+import { hasMap, mapsOf, SCALE_TEXT } from "./residual_cells.js";
 import { residualMap } from "./residual_map.js";
 
 /** @import { Ladder, RecordingRow } from "../../../types/api.js" */
@@ -162,7 +162,7 @@ export function errorLadder(state, signal) {
      * @param {string} name
      */
     const one = (k, name) =>
-      residualMap(name, null, () => ({ maps: pair()[k], limit: colourLimit(...pair()) }), {
+      residualMap(name, SCALE_TEXT, () => ({ maps: pair()[k] }), {
         height: "16rem",
       });
     const both = [one(0, `Version ${parent}`), one(1, `Version ${state.version}`)];

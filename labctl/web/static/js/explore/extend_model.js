@@ -8,6 +8,7 @@ import { labelledField, option, selectField } from "../core/fields.js";
 import { navigate } from "../core/router.js";
 import { changedQuery } from "../core/routes.js";
 import { postFit } from "./accept_warnings.js";
+import { unlessTaken } from "./taken_version.js";
 import { equationDetails } from "../effects/equation.js";
 import { asked, inAddress } from "./chosen_recordings.js";
 import { finishLine, keepFor, stepOf, stepOfPreview } from "./finish_line.js";
@@ -104,6 +105,7 @@ export function extendModel(state, effects) {
       : [],
     ...asked(state),
   });
+  const next = Math.max(...state.versions) + 1;
   const isEmpty = () => !change.add.size && !change.remove.size && !change.formula;
   const stale = () => {
     previewing.classList.toggle("primary", !isEmpty()); // nothing to preview, no next step
@@ -167,7 +169,7 @@ export function extendModel(state, effects) {
       h(
         "div",
         { class: "row" },
-        actButton(`Make version ${Math.max(...state.versions) + 1}`, make, { kind: "primary" }),
+        actButton(`Make version ${next}`, make, { kind: "primary" }),
         h(
           "span",
           { class: "muted small" },
@@ -178,12 +180,16 @@ export function extendModel(state, effects) {
     ];
   }
 
-  async function make() {
-    const made = await postFit(
+  /** @param {{ as_version?: number }} as the number that the button promises; none: whatever the next one is */
+  const makeAs = (as) =>
+    postFit(
       (accepted) =>
-        post("/api/units/{serial}/calibrations/{version}/improve", { path, body: { ...body(), ...accepted } }),
+        post("/api/units/{serial}/calibrations/{version}/improve", { path, body: { ...body(), ...accepted, ...as } }),
       "Make version anyway",
     );
+
+  async function make() {
+    const made = await unlessTaken(state.serial, next, makeAs);
     if (!made) return;
     toast("good", `Version ${made.version} of ${state.serial} was made.`);
     const steps = [stepOf(state), stepOfPreview(state, previewed, made.version)];

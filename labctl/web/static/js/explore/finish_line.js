@@ -4,11 +4,12 @@
 import { setChildren, h, wantsLessMotion } from "../core/elements.js";
 import { axisColour, colour, figure } from "../core/figure.js";
 import { drawnBy, loadPlotly } from "../core/plotly.js";
-import { isNumber, number, percent } from "../core/format.js";
+import { isNumber, number, percent, plainNumber } from "../core/format.js";
 import { button, card } from "../core/components.js";
+import { roundSizes } from "../core/log_ticks.js";
 import { channelTitle, inDatasetOrder, scaled, setText, shownText } from "./dataset_rows.js";
 import { channelOf } from "./preview_result.js";
-import { colourLimit, hasMap, mapsOf } from "./residual_cells.js";
+import { hasMap, mapsOf, SCALE_TEXT } from "./residual_cells.js";
 import { residualMap, selectedRows } from "./residual_map.js";
 
 /** @import { Criticism, Preview, ResidualMap } from "../../../types/api.js" */
@@ -106,12 +107,9 @@ export function finishLine(state, steps, title) {
   const dots = residualDots(state, () => shown, steps[0]);
   const map = !shown.maps.length
     ? null
-    : residualMap(
-        "Residual over floor from version to version",
-        null,
-        () => ({ maps: shown.maps, limit: colourLimit(...steps.map((step) => step.maps)) }),
-        { height: "16rem" },
-      );
+    : residualMap("Residual over floor from version to version", SCALE_TEXT, () => ({ maps: shown.maps }), {
+        height: "16rem",
+      });
   /**
    * @param {Step} step
    * @param {boolean} withMap
@@ -190,8 +188,11 @@ function gainText(before, after) {
   return `${before.title}: ${number(before.rms_dps)} deg/s. ${after.title}: ${number(after.rms_dps)} deg/s, ${change}.`;
 }
 
+/** What the length of the bar is. */
+const SCALE_OF_BAR = "RMS error, deg/s, on a logarithmic scale";
+
 /**
- * The error on a logarithmic line, with the mark of the noise floor.
+ * The error on a logarithmic line with its figures, and with the mark of the noise floor.
  * @param {readonly Step[]} steps
  * @param {number | null} floor
  */
@@ -200,6 +201,9 @@ function errorBar(steps, floor) {
   const [low, high] = [Math.log(Math.min(...sizes) / 1.6), Math.log(Math.max(...sizes) * 1.05)];
   /** @param {number | null} size */
   const place = (size) => (size ? Math.max(0, Math.min((Math.log(size) - low) / (high - low), 1)) : 0);
+  const ticks = roundSizes(Math.exp(low), Math.exp(high)).map((size) =>
+    h("span", { class: "finish-tick small", style: `left: ${100 * place(size)}%` }, plainNumber(size)),
+  );
   const fill = h("i", {});
   const mark = h(
     "span",
@@ -207,7 +211,14 @@ function errorBar(steps, floor) {
     h("span", { class: "small" }, `noise floor ${number(floor)}`),
   );
   return {
-    element: h("div", { class: "finish-bar" }, h("div", { class: "meter thick" }, fill), floor ? mark : null),
+    element: h(
+      "div",
+      { class: "finish-bar", role: "group", "aria-label": SCALE_OF_BAR },
+      floor ? mark : null,
+      h("div", { class: "meter thick" }, fill),
+      h("div", { class: "finish-ticks muted", "aria-hidden": "true" }, ticks),
+      h("p", { class: "muted small" }, SCALE_OF_BAR),
+    ),
     /** @param {number | null} size */
     show: (size) => {
       fill.style.width = `${100 * place(size)}%`;

@@ -6,7 +6,9 @@ import { plainNumber } from "../core/format.js";
 
 /** @typedef {ReturnType<typeof mapCells>["cells"][number]} Cell */
 
-const LIMITS = [3, 10];
+/** End of the colour scale of every map, noise floors: the same for all versions, so that two of them compare. */
+export const COLOUR_LIMIT = 5;
+export const SCALE_TEXT = `The colours end at ${COLOUR_LIMIT} noise floors to either side, for every version; a cell beyond has the colour of the end.`;
 
 /**
  * The maps of an axis, one for each position: columns of equal length, one number for each data set.
@@ -21,17 +23,6 @@ export const mapsOf = (criticism, axis) => criticism.maps.filter((map) => map.ax
  */
 export const hasMap = ({ criticism, axis, motion }) =>
   motion !== "profile" && new Set(mapsOf(criticism, axis).flatMap((map) => map.rate_level_dps)).size > 1;
-
-/**
- * End of the colour scale: the largest residual over floor of several lists of maps, clipped to LIMITS.
- * @param {...readonly Pick<ResidualMap, "over_floor">[]} all
- */
-export function colourLimit(...all) {
-  const largest = all
-    .flat()
-    .reduce((most, map) => map.over_floor.reduce((m, score) => Math.max(m, Math.abs(score)), most), 0);
-  return Math.min(Math.max(largest, LIMITS[0]), LIMITS[1]);
-}
 
 /**
  * Which data sets share a cell, in words.

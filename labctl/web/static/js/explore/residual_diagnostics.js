@@ -11,7 +11,7 @@ import { recordingMarks } from "../core/recording_marks.js";
 import { residualText } from "./chosen_recordings.js";
 import { residualCell } from "./notebook_cell.js";
 import { pointCard } from "./point_card.js";
-import { cellsText, colourLimit, hasMap, mapsOf } from "./residual_cells.js";
+import { cellsText, hasMap, mapsOf, SCALE_TEXT } from "./residual_cells.js";
 import { residualMap, selectedRows, datasetsUnder } from "./residual_map.js";
 import { channelName, channelTitle, scaled, setText, shownText } from "./dataset_rows.js";
 
@@ -39,10 +39,9 @@ export function residualDiagnostics(state) {
     ? null
     : residualMap(
         "Residual over floor",
-        `Each measured cell shows the mean residual of its data sets divided by the noise floor. ${cellsText(state.criticism)}${oneFloorText(state.criticism)} Faded cells are less than two noise floors from zero; a single faded cell is not significant. Drag over cells to select them, or click one cell.`,
+        `Each measured cell shows the mean residual of its data sets divided by the noise floor. ${cellsText(state.criticism)}${oneFloorText(state.criticism)} Faded cells are less than two noise floors from zero; a single faded cell is not significant. ${SCALE_TEXT} Drag over cells to select them, or click one cell.`,
         () => ({
           maps: mapsOf(state.criticism, state.axis),
-          limit: colourLimit(mapsOf(state.criticism, state.axis)),
           pick: state.pick,
         }),
         { onselect: (sets, beside) => state.select(beside ? [...state.pick, ...sets] : sets) },
@@ -297,7 +296,7 @@ function pickedDatasets(state) {
             ),
         },
         { title: "Table rate, deg/s", number: true, cell: (k) => number(rows.channels.table_rate_dps[k], 4) },
-        { title: "Temperature, deg C", number: true, cell: (k) => number(rows.channels.temperature_c[k], 4) },
+        { title: "Temperature, °C", number: true, cell: (k) => number(rows.channels.temperature_c[k], 4) },
         { title: "Up", cell: (k) => rows.position[k] },
         { title: "Residual, deg/s", number: true, cell: (k) => number(rows.residual[k]) },
         { title: "Over floor", number: true, cell: (k) => number(rows.score[k], 2) },

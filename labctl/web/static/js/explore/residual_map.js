@@ -6,7 +6,7 @@ import { number, plainNumber } from "../core/format.js";
 import { datasetRows, distinctLabels } from "./dataset_rows.js";
 import { reachByKeyboard } from "../core/keyboard_points.js";
 import { outlinePoints } from "../core/point_outlines.js";
-import { mapCells } from "./residual_cells.js";
+import { COLOUR_LIMIT, mapCells } from "./residual_cells.js";
 
 /** @import { ResidualMap } from "../../../types/api.js" */
 /** @import { PlotEvent, PlotLayout } from "../../../types/pages.js" */
@@ -19,6 +19,8 @@ import { mapCells } from "./residual_cells.js";
 const DIMMED_BELOW = 2;
 /** Cells that fill less than this share of their rows and columns are drawn where they are, not in a grid. */
 const MIN_FILLED = 0.3;
+/** A screen below this width is narrow. */
+const NARROW_PX = 760;
 /** Height of a panel on a narrow screen, where panels are stacked, px. */
 const PANEL_PX = 210;
 /** A panel has room for its title in whole from this width on; a figure for title and tool bar in one line. */
@@ -47,7 +49,7 @@ const isUnder = ({ sets }, cursor) => cursor?.sets[0] === sets[0];
  * @param {string} position
  */
 const cellText = (cell, position) =>
-  `${plainNumber(cell.rate)} deg/s, ${plainNumber(cell.temperature)} deg C, ${position} up<br>${number(cell.mean, 2)} times the noise floor<br>data set ${cell.sets.slice(0, 6).join(", ")}${cell.sets.length > 6 ? " …" : ""}`;
+  `${plainNumber(cell.rate)} deg/s, ${plainNumber(cell.temperature)} °C, ${position} up<br>${number(cell.mean, 2)} times the noise floor<br>data set ${cell.sets.slice(0, 6).join(", ")}${cell.sets.length > 6 ? " …" : ""}`;
 
 /**
  * Cells as a grid, with a faded layer over those within the noise.
@@ -184,7 +186,7 @@ function positionPanel(map, id, pick, cursor) {
       mark(under, around(CURSOR), "keyboard"),
     ],
     x: { ...x, showgrid: false, title: { text: "table rate, deg/s" } },
-    y: { ...y, showgrid: false, title: id === "" ? { text: "temperature, deg C" } : undefined },
+    y: { ...y, showgrid: false, title: id === "" ? { text: "temperature, °C" } : undefined },
     text: `${map.position} up: ${map.dataset.length} data sets${found.cells.length < map.dataset.length ? ` in ${found.cells.length} cells` : ""}`,
   };
 }
@@ -210,11 +212,11 @@ export function cellPlaces(maps) {
 }
 
 /**
- * The map of an axis, a panel for each position. `give()` returns {maps, limit, pick}; `onselect` gets the data sets
+ * The map of an axis, a panel for each position. `give()` returns {maps, pick}; `onselect` gets the data sets
  * that the keyboard selects, and makes the cells reachable by it.
  * @param {string} name
  * @param {string | null} caption
- * @param {() => { maps: ResidualMap[], limit: number, pick?: ReadonlySet<number> }} give
+ * @param {() => { maps: ResidualMap[], pick?: ReadonlySet<number> }} give
  * @param {object} [options]
  * @param {string} [options.height]
  * @param {(sets: readonly number[], beside: boolean) => unknown} [options.onselect] absent: no cell can be selected
@@ -226,19 +228,20 @@ export function residualMap(name, caption, give, { onselect, height = "22rem" } 
   let drawn = [];
   const draw = () => {
     drawn = [];
-    const { maps, limit, pick = new Set() } = give();
+    const { maps, pick = new Set() } = give();
     const several = maps.length > 1;
-    const below = several && window.innerWidth < 760;
+    const isNarrow = window.innerWidth < NARROW_PX; // there the tools stand above the figure
+    const below = several && isNarrow;
     const width = element.plot.clientWidth;
     const isShort = width / (several && !below ? maps.length : 1) < WHOLE_TITLE_PX;
     /** @type {PlotLayout} */
     const layout = {
-      margin: { l: 52, r: 8, t: 28 + (width < ONE_LINE_PX ? TOOLBAR_PX : 0), b: 46 },
+      margin: { l: 52, r: 8, t: 28 + (width < ONE_LINE_PX && !isNarrow ? TOOLBAR_PX : 0), b: 46 },
       dragmode: onselect ? "select" : false,
       coloraxis: {
         colorscale: DIVERGING,
-        cmin: -limit,
-        cmax: limit,
+        cmin: -COLOUR_LIMIT,
+        cmax: COLOUR_LIMIT,
         colorbar: { title: { text: "residual /<br>noise floor" }, thickness: 12, outlinewidth: 0 },
       },
     };
@@ -303,15 +306,7 @@ export function residualMap(name, caption, give, { onselect, height = "22rem" } 
  * @returns {unknown[][]}
  */
 export const mapRows = (maps) => [
-  [
-    "axis",
-    "position",
-    "data set",
-    "table rate, deg/s",
-    "temperature, deg C",
-    "residual, deg/s",
-    "residual / noise floor",
-  ],
+  ["axis", "position", "data set", "table rate, deg/s", "temperature, °C", "residual, deg/s", "residual / noise floor"],
   ...maps.flatMap((map) =>
     map.dataset.map((set, k) => [
       map.axis,

@@ -4,11 +4,12 @@ import { get, getFollowed, post } from "../core/http/api.js";
 import { isAbort } from "../core/http/errors.js";
 import { whenItMayPass } from "../core/http/recovery.js";
 import { setChildren, h } from "../core/elements.js";
-import { actButton, busyIndicator, errorPage, notice } from "../core/components.js";
+import { actButton, busyIndicator, button, errorPage, notice } from "../core/components.js";
 import { option, toggleGroup } from "../core/fields.js";
 import { duration, idText } from "../core/format.js";
 import { navigate, show } from "../core/router.js";
 import { planAddress } from "../core/routes.js";
+import { elsewhere } from "../campaigns/elsewhere.js";
 import { jointCard } from "../joint/card.js";
 import { asked as askedFor } from "./chosen_recordings.js";
 import { askComparison, errorComparison, isByRates } from "./compare/error_comparison.js";
@@ -43,6 +44,7 @@ const COUNT_MS = 1000;
  * @property {number[]} versions
  * @property {Chosen} chosen
  * @property {RecordingRow["motion"]} motion
+ * @property {boolean} hasBench whether the service drives one
  * @property {Query} query
  * @property {AbortSignal} signal
  */
@@ -233,15 +235,29 @@ function nextSteps(given, criticism) {
 }
 
 /**
- * A link to the plan of the experiment that is advised, or to the recipes where none is.
+ * A link to the plan of the experiment that is advised, or to the recipes where none is. Without a bench a plan here
+ * would be of another, simulated unit: what can be done with the recipe is shown instead.
  * @param {Given} given
  * @param {Criticism} criticism
  * @param {string} kind
  */
-function nextExperiment({ unit }, { experiments }, kind) {
+function nextExperiment({ unit, hasBench }, { experiments }, kind) {
   const plan = experiments.find((each) => each.toml)?.toml;
+  if (plan && !hasBench) return recipeToKeep(unit.serial, plan, kind);
   const href = planAddress(plan ?? "", unit.serial);
   return h("a", { class: `button ${kind}`, href }, plan ? "Next experiment" : "Plan a campaign");
+}
+
+/**
+ * A button that shows once what can be done with the recipe of an experiment where no bench is.
+ * @param {string} serial
+ * @param {string} toml
+ * @param {string} kind
+ */
+function recipeToKeep(serial, toml, kind) {
+  const opening = button("Next experiment", () => setChildren(place, elsewhere(serial, { toml })), { kind });
+  const place = h("div", { style: "flex-basis: 100%", "aria-live": "polite" });
+  return [opening, place];
 }
 
 /**

@@ -9,7 +9,7 @@ import { option, selectField } from "../core/fields.js";
 import { planAddress } from "../core/routes.js";
 import { channelTitle, scaled, shownText } from "./dataset_rows.js";
 import { channelOf } from "./preview_result.js";
-import { colourLimit, hasMap, mapsOf } from "./residual_cells.js";
+import { hasMap, mapsOf } from "./residual_cells.js";
 import { residualMap, selectedRows } from "./residual_map.js";
 import { shapeSliders } from "./what_if_shape.js";
 import { leftWith, levelMeans, partingLevels, partingRecipe, rmsOf } from "./what_if_numbers.js";
@@ -296,7 +296,6 @@ function leftMap(state, left) {
   if (!hasMap(state)) return null;
   const maps = mapsOf(state.criticism, state.axis);
   const rows = selectedRows(state);
-  const limit = colourLimit(maps);
   return residualMap(
     "What would be left over floor",
     null,
@@ -304,7 +303,6 @@ function leftMap(state, left) {
       const values = left();
       const of = new Map(rows.dataset.map((set, k) => [set, values[k]]));
       return {
-        limit,
         maps: maps.map((map) => ({
           ...map,
           over_floor: map.dataset.map((set, k) => {

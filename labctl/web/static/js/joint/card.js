@@ -109,7 +109,7 @@ function heldOut(joint) {
         { title: "Note", prose: true, cell: (row) => row.why },
       ],
       joint.held_out,
-      { label: "Held-out recordings" },
+      { label: "Recordings left out of the fit" },
     ),
     joint.heldout_rms_dps === null
       ? null

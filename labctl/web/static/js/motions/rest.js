@@ -64,7 +64,7 @@ export function restFigures(found, axis) {
 /** @param {RestColumns} rows */
 function alongOf(rows) {
   if (rows.temperature_c.some((value) => value !== null))
-    return { x: rows.temperature_c, title: "gyro temperature, deg C" };
+    return { x: rows.temperature_c, title: "gyro temperature, °C" };
   if (rows.t_s.some((value) => value !== null)) return { x: times(rows.t_s, 1 / 3600), title: "time, h" };
   return { x: rows.dataset, title: "data set" };
 }

@@ -8,6 +8,7 @@ import { busyIndicator, card, chip, factList, pageHeader, notice } from "../core
 import { navigate, updateQuery } from "../core/router.js";
 import { attendanceNotice } from "../campaigns/attendance.js";
 import { SIMULATED } from "../campaigns/campaign_time.js";
+import { elsewhere } from "../campaigns/elsewhere.js";
 import { startForm } from "../campaigns/start_form.js";
 import { hiddenEffectForm } from "../campaigns/hidden_effects.js";
 import { mountingWorth } from "../campaigns/mounting_worth.js";
@@ -29,15 +30,15 @@ const TURNS_TELL =
  * A plan that was made for a unit measures the units that are on the bench, and not that one where it is not there.
  * @param {string | undefined} unit
  * @param {Bench | null} bench
+ * @param {{ toml?: string, name?: string }} recipe that is planned
  */
-function absentNotice(unit, bench) {
+function absentNotice(unit, bench, recipe) {
   if (!unit || bench?.units.some(({ serial }) => serial === unit)) return null;
   if (!bench)
-    return notice(
-      "warn",
-      h("strong", {}, `This experiment is for ${unit}, and this service drives no bench. `),
-      `What is simulated here is another, simulated unit: it says nothing of ${unit}. To measure ${unit}, start labctl with its bench (labctl serve --bench FILE).`,
-    );
+    return elsewhere(unit, {
+      ...recipe,
+      more: `What is simulated here is another, simulated unit: it says nothing of ${unit}.`,
+    });
   const there = bench.units.map(({ serial }) => serial).join(", ") || "no unit";
   return notice(
     "warn",
@@ -137,7 +138,7 @@ export async function page({ query, signal }) {
         : "Computed for the simulated bench that suits this recipe best.",
       h("a", { class: "button", href: "#begin" }, "Begin …"),
     ),
-    absentNotice(query.unit, bench),
+    absentNotice(query.unit, bench, query.toml ? { toml: query.toml } : { name: named.name }),
     query.recipe && named.name !== query.recipe && !query.toml
       ? notice(
           "warn",

@@ -25,7 +25,10 @@ export async function page({ query: asked, signal }) {
   // with the unit in the address, what is asked for does not wait for the list
   const asking = asked.unit ? readUnit(asked.unit, asked, signal) : null;
   asking?.catch(() => {}); // awaited below
-  const units = await get("/api/units", { query: { limit: LISTED }, signal });
+  const [units, benches] = await Promise.all([
+    get("/api/units", { query: { limit: LISTED }, signal }),
+    get("/api/benches", { signal }),
+  ]);
   if (!units.length) {
     return h(
       "div",
@@ -54,7 +57,10 @@ export async function page({ query: asked, signal }) {
   if (!unit.recordings.length) element.append(notice("", "This unit has no recording; import one, or run a campaign."));
   else if (!calibration) element.append(firstFitCard(unit, chosen, motion));
   else if (motion === "poses") element.append(posesView(unit.serial, calibration, chosen.recording, signal));
-  else element.append(versionView({ unit, calibration, versions, chosen, motion, query: asked, signal }));
+  else {
+    const hasBench = benches.length > 0;
+    element.append(versionView({ unit, calibration, versions, chosen, motion, hasBench, query: asked, signal }));
+  }
   return element;
 }
 

@@ -182,7 +182,7 @@ function conditionsCard({ info, datasets, readings: n, kind }, sets) {
         ? [
             "Gyro temperature",
             warm[0] === warm[1] ? number(warm[0]) : `${number(warm[0])} to ${number(warm[1])}`,
-            "deg C",
+            "°C",
             datasets > 1 ? "means of the data sets" : "mean",
           ]
         : null,

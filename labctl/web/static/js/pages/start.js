@@ -4,6 +4,7 @@ import { get, getPart, post } from "../core/http/api.js";
 import { h } from "../core/elements.js";
 import { percent } from "../core/format.js";
 import { actButton, card, pageHeader } from "../core/components.js";
+import { NO_BENCH } from "../core/no_bench.js";
 import { presentWords } from "../core/freshness/line.js";
 import { navigate } from "../core/router.js";
 import { changedQuery } from "../core/routes.js";
@@ -25,14 +26,15 @@ const SHOWN = 6;
 
 /** @param {PageContext} context */
 export async function page({ signal }) {
-  const [units, due, campaigns, benches, schedule] = await Promise.all([
+  const [units, due, campaigns, benches, schedule, events] = await Promise.all([
     get("/api/units", { query: { limit: SHOWN }, signal }),
     getPart("/api/units", { query: { due_within: DUE_WITHIN, limit: DUE_SHOWN }, signal }),
     get("/api/campaigns", { query: { limit: NEWEST }, signal }),
     get("/api/benches", { signal }),
     get("/api/schedule", { signal }),
+    get("/api/calibration-events", { signal }),
   ]);
-  if (units.length || campaigns.length) return overview(units, { due, campaigns, benches, schedule });
+  if (units.length || campaigns.length) return overview(units, { due, campaigns, benches, schedule, events });
   return h(
     "div",
     { class: "page" },
@@ -164,7 +166,7 @@ function overview(units, found) {
                     : `${benches[0].name} is free.`,
               ),
             )
-          : h("p", {}, "This service drives no bench."),
+          : h("p", {}, `${NO_BENCH}.`),
         h(
           "div",
           { class: "buttons" },

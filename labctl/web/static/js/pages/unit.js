@@ -19,7 +19,7 @@ import { uncertaintyInUse } from "../unit/uncertainty.js";
 import { versionFacts } from "../unit/version_facts.js";
 import { versionsCard } from "../unit/versions.js";
 
-/** @import { CalibrationRow, Ladder } from "../../../types/api.js" */
+/** @import { CalibrationRow, Ladder, Unit } from "../../../types/api.js" */
 
 /** @import { PageContext } from "../../../types/pages.js" */
 
@@ -50,7 +50,7 @@ export async function page({ params, signal }) {
       unit.serial,
       unitLine(unit),
       h("a", { class: "button primary", href: explore }, "Explore"),
-      h("a", { class: "button act", href: `/live?unit=${encodeURIComponent(unit.serial)}` }, "Calibrate live"),
+      liveLink(unit),
       batchButton(unit),
     ),
     h("section", { class: "card", "aria-label": "In force" }, inForce(unit, rows, force)),
@@ -89,6 +89,18 @@ export async function page({ params, signal }) {
     ),
   );
 }
+
+/** Outputs that a live calibration needs: it compares turns about all three body axes with gravity. */
+const LIVE_AXES = 3;
+
+/**
+ * The link to a live calibration; null for a unit whose newest recording shows that it has fewer outputs.
+ * @param {Unit} unit
+ */
+const liveLink = ({ serial, axes }) =>
+  axes.length && axes.length < LIVE_AXES
+    ? null
+    : h("a", { class: "button act", href: `/live?unit=${encodeURIComponent(serial)}` }, "Calibrate live");
 
 /** @param {Promise<Ladder | null>} asking */
 function ladder(asking) {

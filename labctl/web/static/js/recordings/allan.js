@@ -81,7 +81,7 @@ export function allan(state, signal) {
 function allanFigure(dataset, found) {
   const axes = Object.entries(found.axes);
   const [first, last] = [found.datasets[0], found.datasets.at(-1)];
-  const where = `Data set${first === last ? ` ${first}` : `s ${first} to ${last}`}, ${duration(found.duration_s)}${found.temperature_c === null ? "" : ` at ${withUnit(found.temperature_c, "deg C")}`}.`;
+  const where = `Data set${first === last ? ` ${first}` : `s ${first} to ${last}`}, ${duration(found.duration_s)}${found.temperature_c === null ? "" : ` at ${withUnit(found.temperature_c, "°C")}`}.`;
   const draw = () => ({
     data: axes.flatMap(([axis, noise]) => [
       {

@@ -6,7 +6,7 @@
 const UNIT_SUFFIXES = [
   ["_dps", "deg/s"],
   ["_deg", "deg"],
-  ["_c", "deg C"],
+  ["_c", "°C"],
   ["_pct", "%"],
   ["_ut", "uT"],
   ["_g", "g"],

@@ -146,11 +146,9 @@ function pageTable(state, rows) {
           }
         : null,
       warm
-        ? { title: "Set point, deg C", number: true, cell: (k) => plainNumber(sets.chamber_setpoint_c[k] ?? NaN) }
+        ? { title: "Set point, °C", number: true, cell: (k) => plainNumber(sets.chamber_setpoint_c[k] ?? NaN) }
         : null,
-      sets.channels.temperature_c
-        ? { title: "Gyro, deg C", number: true, cell: (k) => of("temperature_c", k, 4) }
-        : null,
+      sets.channels.temperature_c ? { title: "Gyro, °C", number: true, cell: (k) => of("temperature_c", k, 4) } : null,
       ...gyros.map((name) => ({
         title: `${channelName(name).replace("gyro output", "Output")}, ${channelUnit(name, output)}`,
         number: true,

@@ -20,7 +20,7 @@ export function meanPlots(state) {
   const coloraxis = warm ? temperatureColours(warm.filter((value) => value !== null)).axis : undefined;
   const tips = sets.number.map(
     (number, k) =>
-      `data set ${number}: ${plainNumber(sets.table_rate_dps[k], 6)} deg/s${warm ? ` at ${plainNumber(warm[k])} deg C` : ""}, ${sets.position[k]} up`,
+      `data set ${number}: ${plainNumber(sets.table_rate_dps[k], 6)} deg/s${warm ? ` at ${plainNumber(warm[k])} °C` : ""}, ${sets.position[k]} up`,
   );
   /** @param {number} k */
   const spot = (k) => (sets.number[k] === state.dataset ? 13 : 5);
@@ -73,7 +73,7 @@ export function meanPlots(state) {
       showlegend: false,
       margin: { l: 58, r: 12, t: 8, b: 46 },
       xaxis: { title: { text: "data set" } },
-      yaxis: { title: { text: "gyro temperature, deg C" } },
+      yaxis: { title: { text: "gyro temperature, °C" } },
     },
   });
   const pictures = [

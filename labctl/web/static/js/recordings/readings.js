@@ -87,8 +87,8 @@ function summary(state, k) {
       ? [
           "Gyro temperature",
           number(sets.channels.temperature_c.mean[k], 4),
-          "deg C",
-          sets.chamber_setpoint_c[k] === null ? null : `set point ${plainNumber(sets.chamber_setpoint_c[k])} deg C`,
+          "°C",
+          sets.chamber_setpoint_c[k] === null ? null : `set point ${plainNumber(sets.chamber_setpoint_c[k])} °C`,
         ]
       : null,
     ...outputs,

@@ -1,10 +1,10 @@
 // What has happened since the evening before, and what waits for a person: one row for each, the most urgent first. Units
 // that are due have a list of their own.
 
-import { number, percent } from "../core/format.js";
+import { number, percent, personText } from "../core/format.js";
 import { stateText } from "../campaigns/states.js";
 
-/** @import { Bench, Campaign, Scheduled } from "../../../types/api.js" */
+/** @import { Bench, CalibrationEvent, Campaign, Scheduled } from "../../../types/api.js" */
 
 /** @typedef {"bad" | "warn" | "good" | "accent"} Kind */
 /**
@@ -52,11 +52,12 @@ export function beginOf(span, now) {
  * @param {readonly Campaign[]} found.campaigns
  * @param {readonly Bench[]} found.benches
  * @param {readonly Scheduled[]} found.schedule
+ * @param {readonly CalibrationEvent[]} found.events newest first
  * @param {Span} span
  * @param {Date} now
  * @returns {News[]}
  */
-export function newsOf({ campaigns, benches, schedule }, span, now) {
+export function newsOf({ campaigns, benches, schedule, events }, span, now) {
   const begin = beginOf(span, now);
   /** @param {string | null | undefined} at */
   const isNew = (at) => !at || Date.parse(at) >= begin;
@@ -70,6 +71,10 @@ export function newsOf({ campaigns, benches, schedule }, span, now) {
     ...recent.flatMap(campaignNews),
     ...recent.filter((each) => each.ended).flatMap(draftNews),
     ...schedule.flatMap((start) => missedNews(start, isNew)),
+    ...calibrationNews(
+      events.filter(({ at }) => isNew(at)),
+      campaigns,
+    ),
   ];
   return news.sort((a, b) => URGENCY[a.kind] - URGENCY[b.kind] || orderOf(a, b));
 }
@@ -194,6 +199,52 @@ function draftNews(campaign) {
     ];
   });
 }
+
+/** Calibrations and certifications that are listed. */
+const EVENTS = 20;
+
+/**
+ * Versions that were made by a person, and what was certified or revoked. A draft of a campaign has a row of its own.
+ * @param {readonly CalibrationEvent[]} events
+ * @param {readonly Campaign[]} campaigns
+ * @returns {News[]}
+ */
+function calibrationNews(events, campaigns) {
+  /** @param {{ serial: string, version: number | null }} of */
+  const nameOf = ({ serial, version }) => JSON.stringify([serial, version]);
+  const drafts = new Set(campaigns.flatMap((campaign) => campaign.drafts.map(nameOf)));
+  return events
+    .filter((event) => event.act !== "made" || !drafts.has(nameOf(event)))
+    .slice(0, EVENTS)
+    .map((event) => ({
+      ...PLAIN,
+      at: event.at,
+      about: event.serial,
+      ...EVENT_TEXTS[event.act](event),
+    }));
+}
+
+/** @type {Record<CalibrationEvent["act"], (event: CalibrationEvent) => Pick<News, "kind" | "text" | "href" | "act">>} */
+const EVENT_TEXTS = {
+  made: ({ serial, version, model }) => ({
+    kind: "good",
+    text: `version ${version} was made: ${model}.`,
+    href: `/explore?unit=${encodeURIComponent(serial)}&version=${version}`,
+    act: "Explore",
+  }),
+  certify: ({ serial, version, by }) => ({
+    kind: "good",
+    text: `version ${version} was certified by ${personText(by)}.`,
+    href: unitPage(serial),
+    act: "Open",
+  }),
+  revoke: ({ serial, version, by }) => ({
+    kind: "warn",
+    text: `version ${version} was revoked by ${personText(by)}.`,
+    href: unitPage(serial),
+    act: "Open",
+  }),
+};
 
 /**
  * Starts that were missed or refused.

@@ -37,7 +37,11 @@ export function newsCard(found) {
         : null,
       rows.length
         ? h("ul", { class: "news plain", "aria-label": SPANS[span] }, shown.map(newsRow))
-        : h("p", { class: "muted" }, "No campaign has ended, failed or waits for a person, and no start was missed."),
+        : h(
+            "p",
+            { class: "muted" },
+            "No version was made, certified or revoked, no campaign has ended, failed or waits for a person, and no start was missed.",
+          ),
       shown.length < rows.length
         ? h(
             "button",

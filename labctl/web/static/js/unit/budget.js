@@ -24,8 +24,8 @@ export function budgetLines(answer) {
     answer.not_stated.length
       ? notice(
           "warn",
-          h("strong", {}, "Not stated for the bench, and not in U: "),
-          `${answer.not_stated.join(", ")}. Add them to [[standards]] of the bench file.`,
+          h("strong", {}, "Not stated, and not in U: "),
+          `${answer.not_stated.join(", ")}. ${answer.not_stated_remedy}`,
         )
       : null,
     Object.entries(answer.budget).map(([axis, budget]) =>
@@ -63,10 +63,13 @@ export function budgetLines(answer) {
   );
 }
 
+/** The line of the model as calibration files name it, and as all pages do. */
+const [HELD_OUT, LEFT_OUT] = ["held-out data sets", "data sets left out of the fit"];
+
 /** @param {BudgetLine} line */
 function nameOf(line) {
   const name = ["coefficients", "model", "repeatability"].includes(line.source)
-    ? `${line.source} (${line.name})`
+    ? `${line.source} (${line.name === HELD_OUT ? LEFT_OUT : line.name})`
     : line.name;
   return line.overdue ? [name, " ", chip(`overdue since ${line.due}`, "bad")] : name;
 }
@@ -90,12 +93,12 @@ export function contributionFigures(contributions) {
         `Contributions, axis ${axis}, over rate`,
         over.over_rate,
         "rate, deg/s",
-        `Axis ${axis}, at ${plainNumber(over.temperature_c, 3)} deg C`,
+        `Axis ${axis}, at ${plainNumber(over.temperature_c, 3)} °C`,
       ),
       one(
         `Contributions, axis ${axis}, over temperature`,
         over.over_temperature,
-        "temperature, deg C",
+        "temperature, °C",
         `Axis ${axis}, at ${plainNumber(over.rate_dps)} deg/s`,
       ),
     ]),
@@ -127,7 +130,7 @@ function one(name, lines, along, at) {
   };
   return figure(
     name,
-    `${at}: the largest standard uncertainties of the budget, the others together (root of the sum of their squares). ${lines.expanded.some(isNumber) ? "Dashed: the expanded uncertainty U" : "U is not known"}. Uncertainties that the bench does not state have no line.`,
+    `${at}: the largest standard uncertainties of the budget, the others together (root of the sum of their squares). ${lines.expanded.some(isNumber) ? "Dashed: the expanded uncertainty U" : "U is not known"}. Uncertainties that are not stated have no line.`,
     draw,
     { height: innerWidth < NARROW_PX ? "26rem" : "21rem", csv: () => contributionRows(lines, along) },
   );

@@ -2,7 +2,7 @@
 
 import { download, get, post } from "../core/http/api.js";
 import { h } from "../core/elements.js";
-import { actButton, button, notice, toast, withCommands } from "../core/components.js";
+import { actButton, button, loadInto, notice, toast, withCommands } from "../core/components.js";
 import { dialog } from "../core/dialog.js";
 import { capitalised } from "../core/format.js";
 import { messageOf, Problem } from "../core/http/errors.js";
@@ -35,8 +35,9 @@ const kept = new Map();
 export function certificateFiles(serial, version, issued, history) {
   const certified = history.find((act) => act.version === version)?.act === "certify";
   const newest = issued.find((each) => each.version === version);
-  if (!newest && !certified) return h("span", { class: "muted small" }, "Certificate: only once it is certified");
-  if (!newest) return actButton("Issue certificate", () => askCertificate(serial, version), { kind: "tiny" });
+  if (!newest && !certified)
+    return [h("span", { class: "muted small" }, "Certificate: only once it is certified"), needs(serial, version)];
+  if (!newest) return issuing(serial, version);
   return h(
     "div",
     { class: "stack", role: "group", "aria-label": `Certificate ${newest.number}` },
@@ -65,6 +66,75 @@ export function certificateFiles(serial, version, issued, history) {
 }
 
 /**
+ * What the certificate of a version needs beside its certification, read when it is opened.
+ * @param {string} serial
+ * @param {number} version
+ */
+function needs(serial, version) {
+  const place = h("div");
+  const ontoggle = () =>
+    loadInto(place, "Reading what a certificate needs", async () => {
+      const never = await notStatable(serial, version, visitSignal());
+      return never.length ? neverList(never) : h("p", { class: "small" }, ORDER_STATES);
+    });
+  return h("details", { ontoggle }, h("summary", {}, "What it needs"), place);
+}
+
+/**
+ * The button that issues a certificate of a certified version. Where a fact is missing that no order can state, this
+ * is said in its place, before anything is pressed; a list that cannot be read leaves the button, which says why.
+ * @param {string} serial
+ * @param {number} version
+ */
+function issuing(serial, version) {
+  const place = h("div", { class: "stack", role: "group", "aria-label": `Certificate of version ${version}` });
+  const issue = actButton("Issue certificate", () => askCertificate(serial, version), { kind: "tiny" });
+  loadInto(place, "Reading what a certificate needs", async () => {
+    const never = await notStatable(serial, version, visitSignal()).catch(() => []);
+    return never.length
+      ? h(
+          "details",
+          {},
+          h("summary", {}, `No certificate can be issued. ${missingNames(never)}`),
+          h("p", { class: "small" }, NO_ORDER),
+          neverList(never),
+        )
+      : issue;
+  });
+  return place;
+}
+
+/**
+ * The facts that a certificate of a version lacks, that no order can state, and that its certification does not supply.
+ * @param {string} serial
+ * @param {number} version
+ * @param {AbortSignal} signal
+ */
+export const notStatable = async (serial, version, signal) =>
+  unstatable(await missingOf(serial, version, signal)).filter(({ fact }) => fact !== AUTHORISATION);
+
+/** @param {readonly MissingFact[]} missing */
+export const missingNames = (missing) => `Missing: ${missing.map(({ fact }) => fact).join("; ")}.`;
+
+/**
+ * @param {string} serial
+ * @param {number} version
+ * @param {AbortSignal} signal
+ */
+const missingOf = (serial, version, signal) =>
+  get("/api/units/{serial}/calibrations/{version}/certificate/missing", { path: { serial, version }, signal });
+
+/** @param {readonly MissingFact[]} missing that no order can state */
+const neverList = (missing) =>
+  h(
+    "ul",
+    { class: "plain small" },
+    missing.map(({ fact, where, remedy }) =>
+      h("li", {}, h("strong", {}, `Missing: ${fact}. `), withCommands(remedy || `State it: ${where}.`)),
+    ),
+  );
+
+/**
  * Ask for the facts of the order, until a certificate is issued; a refusal is shown beside what was filled in. Where a
  * fact is missing that no order can state, the form is not offered: it is said what to do.
  * @param {string} serial
@@ -74,7 +144,7 @@ export function certificateFiles(serial, version, issued, history) {
 async function askCertificate(serial, version, replaced) {
   const path = { serial, version };
   const left = visitSignal();
-  const missing = await get("/api/units/{serial}/calibrations/{version}/certificate/missing", { path, signal: left });
+  const missing = await missingOf(serial, version, left);
   const never = unstatable(missing);
   if (never.length) return void (await sayMissing(serial, version, never, left));
   const fields = [...(replaced ? [reasonField(replaced)] : []), ...fieldsFor(missing)];
@@ -85,7 +155,7 @@ async function askCertificate(serial, version, replaced) {
     fields.map((field) => ({ ...field, value: given[field.name] })),
     {
       text: "A certificate is a document for a customer; which version is in force does not change. The certificate is written to the audit trail.",
-      body: h("p", {}, missing.some(({ table }) => table === "laboratory") ? NO_LABORATORY : LABORATORY),
+      body: h("p", {}, ofLaboratory(missing)),
       confirm: "Issue certificate",
       signal: left,
       check: (entries) => problemsOf(fields, entries),
@@ -137,23 +207,27 @@ function refusalOf(error) {
  */
 const sayMissing = (serial, version, missing, signal) =>
   dialog(`No certificate of ${serial} version ${version} yet`, [], {
-    text: "What is missing belongs to the measurement, so this page cannot add it. Nothing else is asked for before it is stated.",
-    body: notice(
-      "warn",
-      h(
-        "ul",
-        { class: "plain" },
-        missing.map(({ fact, where, remedy }) =>
-          h("li", {}, h("strong", {}, `Missing: ${fact}. `), withCommands(remedy || `State it: ${where}.`)),
-        ),
-      ),
-    ),
+    text: `${NO_ORDER} Nothing else is asked for before it is stated.`,
+    body: notice("warn", neverList(missing)),
     confirm: "Close",
     signal,
   });
 
+/**
+ * Where the facts of the laboratory come from, and what states them in later certificates.
+ * @param {readonly MissingFact[]} missing
+ */
+function ofLaboratory(missing) {
+  const fact = missing.find(({ table }) => table === "laboratory");
+  return fact ? [NO_LABORATORY, fact.remedy].filter(Boolean).join(" ") : LABORATORY;
+}
+
 const LABORATORY = "Laboratory and reference standards come from the bench file.";
 
+/** The fact that the act of certification itself supplies, by its name in the answer. */
+const AUTHORISATION = "authorisation";
+const ORDER_STATES = "Once it is certified, the order of the customer states everything else that a certificate needs.";
+const NO_ORDER = "What is missing belongs to the measurement: no order can state it.";
+
 /** Where the measurement states no laboratory. */
-const NO_LABORATORY =
-  "The measurement states no laboratory, so this form asks for it. A [laboratory] in the bench file states it in every certificate of later campaigns.";
+const NO_LABORATORY = "The measurement states no laboratory, so this form asks for it.";

@@ -6,6 +6,7 @@ import { dated, instant, number, personText } from "../core/format.js";
 import { actButton, chip, factList, notice, table, toast } from "../core/components.js";
 import { dialog, WHO } from "../core/dialog.js";
 import { show, visitSignal } from "../core/router.js";
+import { missingNames, notStatable } from "./certificate.js";
 import { withoutPart } from "./uncertainty_parts.js";
 
 /** @import { AnyAxisUncertainty, Assessment, Certification, Fetch, ReleaseRequest } from "../../../types/api.js" */
@@ -53,7 +54,10 @@ const NO_DUE_DATE = 0;
  */
 export async function askCertification(serial, version, left = visitSignal()) {
   const path = { serial, version };
-  const known = await get("/api/units/{serial}/calibrations/{version}/assessment", { path, signal: left });
+  const [known, never] = await Promise.all([
+    get("/api/units/{serial}/calibrations/{version}/assessment", { path, signal: left }),
+    notStatable(serial, version, left).catch(() => []), // then it is said when the certificate is issued
+  ]);
   const needed = known.override_needed;
   const words = `A sentence: at least ${known.least_reason_characters} characters and ${known.least_reason_words} words.`;
   /** @type {Field[]} */
@@ -81,7 +85,12 @@ export async function askCertification(serial, version, left = visitSignal()) {
   let already = null;
   const answers = await dialog(`Certify version ${version} of ${serial}: put it in force`, fields, {
     text: "After this, every request for the calibration of this unit gets this version. The certification is written to the audit trail. It makes no document: a certificate for a customer is issued afterwards.",
-    body: assessed(known),
+    body: [
+      assessed(known),
+      never.length
+        ? h("p", { class: "small" }, h("strong", {}, "No certificate can be issued afterwards. "), missingNames(never))
+        : null,
+    ],
     confirm: "Certify: put in force",
     kind: needed ? "danger" : "primary",
     signal: left,

@@ -80,7 +80,7 @@ export const coefficientColumns = (version) =>
   Object.entries(version.axes).flatMap(([axis, values]) => columnsOf(axis, values));
 
 /** @type {Readonly<Record<string, string>>} units of the parameters of effects by the end of their name */
-const PARAMETER_UNITS = { dps: "deg/s", s: "s", hz: "Hz", c: "deg C" };
+const PARAMETER_UNITS = { dps: "deg/s", s: "s", hz: "Hz", c: "°C" };
 
 /**
  * What the coefficients of a version are relative to, and the parameters of its effects that no coefficient states.
@@ -89,7 +89,7 @@ const PARAMETER_UNITS = { dps: "deg/s", s: "s", hz: "Hz", c: "deg C" };
 export function termsText({ axes, model, reference_temperature_c }) {
   const names = Object.values(axes).flatMap(({ coefficients }) => Object.keys(coefficients));
   const reference = names.some((name) => /_t\d$/.test(name))
-    ? [`T_ref is ${plainNumber(reference_temperature_c)} deg C`]
+    ? [`T_ref is ${plainNumber(reference_temperature_c)} °C`]
     : [];
   /** @param {string} name */
   const isCoefficient = (name) => names.includes(name) || names.includes(name.replace(/_[xyz]$/, ""));

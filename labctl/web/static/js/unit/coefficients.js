@@ -19,7 +19,7 @@ const ERRORS = [
   ["noise_floor_dps", "noise floor"],
 ];
 const FIT_ALONE =
-  "The uncertainties are those of the fit alone. What the model leaves and the reference standards of the bench count in the uncertainty in use below; the command labctl uncertainty states it for each coefficient.";
+  "The uncertainties are those of the fit alone. What the model leaves and the reference standards count in the uncertainty in use below; the command labctl uncertainty states it for each coefficient.";
 /** Coverage factor of the bars: expanded uncertainty. */
 const K = 2;
 
@@ -134,7 +134,7 @@ function columnsFigure(name, columns, front) {
   const draw = () => ({
     data: columns.map(line),
     layout: {
-      xaxis: { title: { text: "temperature, deg C" } },
+      xaxis: { title: { text: "temperature, °C" } },
       yaxis: {
         title: { text: shown ? `${idText(name)}, ${shown}` : idText(name), font: { color: colour("text-muted") } },
       },

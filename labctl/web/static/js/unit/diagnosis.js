@@ -5,6 +5,7 @@ import { h, setChildren } from "../core/elements.js";
 import { idText, inWords } from "../core/format.js";
 import { actButton, cardWithHeader, chip, table, toast, withCommands } from "../core/components.js";
 import { dialog } from "../core/dialog.js";
+import { NO_BENCH, WITH_BENCH } from "../core/no_bench.js";
 import { visitSignal } from "../core/router.js";
 import { askBenchClear, askingButton } from "../bench/actions.js";
 import { diagnosisState, effectsOfRounds, lineOfRound, suspectColumns } from "./diagnosis_rounds.js";
@@ -15,8 +16,7 @@ import { diagnosisState, effectsOfRounds, lineOfRound, suspectColumns } from "./
 const POLL_MS = 2000;
 
 /** Said at once, and not after the hours were asked for. */
-const NO_BENCH =
-  "This service drives no bench, so it runs no experiment: start it with labctl serve --bench FILE, or with --simulate for a simulated bench.";
+const NO_EXPERIMENT = `${NO_BENCH}, so it runs no experiment: start it with ${WITH_BENCH.real}, or with --simulate for a simulated bench.`;
 
 /**
  * A card of the newest diagnosis, with the button that starts one; it is read again as long as it goes on.
@@ -153,7 +153,7 @@ const startButton = (serial, again) =>
   actButton("Diagnose", async () => {
     const left = visitSignal();
     if (!(await get("/api/benches", { signal: left })).length) {
-      toast("bad", NO_BENCH);
+      toast("bad", NO_EXPERIMENT);
       return;
     }
     const answers = await dialog(

@@ -92,7 +92,7 @@ function over({ grid, coverage_factor }) {
     table(
       [
         several ? { title: "Axis", cell: (row) => row.axis } : null,
-        { title: "Temperature, deg C", number: true, cell: (row) => fixed(row.warm, 1) },
+        { title: "Temperature, °C", number: true, cell: (row) => fixed(row.warm, 1) },
         ...grid.rate_dps.map((rate, k) => ({
           title: `${plainNumber(rate, 3)} deg/s`,
           number: true,
@@ -243,7 +243,7 @@ function parts(first, place, path, signal) {
     "div",
     { class: "stack" },
     h("h3", {}, "Contributions to the uncertainty"),
-    h("div", { class: "row" }, labelledField("Rate, deg/s", rate), labelledField("Temperature, deg C", warm)),
+    h("div", { class: "row" }, labelledField("Rate, deg/s", rate), labelledField("Temperature, °C", warm)),
     result,
   );
 }

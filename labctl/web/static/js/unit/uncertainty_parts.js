@@ -34,7 +34,7 @@ const PARTS = [
     from: (one) => one.repeatability_source ?? "",
   },
 ];
-const STANDARDS = "Reference standards of the bench";
+const STANDARDS = "Reference standards";
 /**
  * Uncertainties have two significant digits (GUM 7.2.6).
  * @param {number | null} u_dps
@@ -69,7 +69,7 @@ export function atPlace(answer) {
       title: STANDARDS,
       of: (one) =>
         one.standards_dps === null ? h("span", { class: "warn-text" }, "not stated") : shown(one.standards_dps),
-      from: (one) => (one.standards_dps === null ? "the bench file states none" : "the budget below names each"),
+      from: (one) => (one.standards_dps === null ? "none is stated" : "the budget below names each"),
     },
     { title: "Combined", of: (one) => figure(one.combined_dps), from: becauseOf },
     { title: `Expanded, k = ${k}`, of: (one) => figure(one.expanded_dps, true), from: becauseOf },

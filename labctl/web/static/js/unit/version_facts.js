@@ -57,7 +57,7 @@ function heldOutByLeg({ error }) {
         error.heldout_by_leg.some((row) => row.why) ? { title: "Note", prose: true, cell: (row) => row.why } : null,
       ],
       error.heldout_by_leg,
-      { label: "Held out by leg" },
+      { label: "Left out by leg" },
     ),
   ];
 }

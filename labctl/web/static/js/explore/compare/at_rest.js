@@ -53,12 +53,12 @@ export function atRest(comparison, state) {
         error_y: floor ? { type: "constant", value: 2 * floor, thickness: 1, width: 0 } : undefined,
         text: rest.recording.map((recording) => (marks.legend.length ? `recording ${recording}, ` : "")),
         marker: { color: axisColour(state.axis), size: 7, ...marks.marker },
-        hovertemplate: "%{text}data set %{customdata}<br>%{x:.4g} deg C: %{y:.4g} deg/s<extra></extra>",
+        hovertemplate: "%{text}data set %{customdata}<br>%{x:.4g} °C: %{y:.4g} deg/s<extra></extra>",
       },
       ...marks.legend,
     ],
     layout: {
-      xaxis: { title: { text: "gyro temperature, deg C" } },
+      xaxis: { title: { text: "gyro temperature, °C" } },
       yaxis: { title: { text: "error at rest, deg/s" } },
     },
   });

@@ -41,7 +41,7 @@ export function fullTurn(comparison, state) {
     /** @type {Axes} */
     const axes = {
       x: ["rate, deg/s", span(rows.rate)],
-      y: ["deg C", span(rows.temperature_c)],
+      y: ["°C", span(rows.temperature_c)],
       z: ["deg per turn", span([...turn.before, ...turn.after])],
     };
     return {
@@ -83,7 +83,7 @@ function turnTraces(rows, turn, name, scene, colours) {
     z: turn,
     marker: { size: 3, color: rows.temperature_c, coloraxis: "coloraxis" },
     customdata: rows.dataset,
-    hovertemplate: "data set %{customdata}<br>%{x:.4g} deg/s, %{y:.3g} deg C<br>%{z:.3g} deg per turn<extra></extra>",
+    hovertemplate: "data set %{customdata}<br>%{x:.4g} deg/s, %{y:.3g} °C<br>%{z:.3g} deg per turn<extra></extra>",
   };
   return levels.length > MAX_LINES
     ? [dots]
@@ -97,7 +97,7 @@ function turnTraces(rows, turn, name, scene, colours) {
             return {
               type: "scatter3d",
               mode: "lines",
-              name: `${plainNumber(level, 3)} deg C`,
+              name: `${plainNumber(level, 3)} °C`,
               scene,
               x: line.map((k) => rows.rate[k]),
               y: line.map((k) => rows.temperature_c[k]),

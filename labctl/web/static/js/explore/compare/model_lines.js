@@ -85,7 +85,7 @@ export function overRate(comparison, state) {
       data: [
         ...lines.flatMap((each) =>
           each.level.map((level, k) =>
-            line(...alongRate(each, each.error_dps[k]), `${plainNumber(level, 3)} deg C`, colours.of(level)),
+            line(...alongRate(each, each.error_dps[k]), `${plainNumber(level, 3)} °C`, colours.of(level)),
           ),
         ),
         ...dots(rows, rows.rate, rows.temperature_c, "deg/s"),
@@ -126,11 +126,11 @@ export function overTemperature(comparison, state) {
             ),
           ),
         ),
-        ...dots(rows, rows.temperature_c, rows.rate, "deg C"),
+        ...dots(rows, rows.temperature_c, rows.rate, "°C"),
       ],
       layout: {
         coloraxis: colours.axis,
-        xaxis: { title: { text: "gyro temperature, deg C" } },
+        xaxis: { title: { text: "gyro temperature, °C" } },
         yaxis: { title: { text: "error of the output, deg/s" } },
       },
     };
@@ -191,7 +191,7 @@ export function allPanels(comparison) {
       return [
         ...lines.flatMap((each) =>
           each.level.map((level, k) =>
-            line(...alongRate(each, each.error_dps[k]), `${plainNumber(level, 3)} deg C`, colours.of(level), place),
+            line(...alongRate(each, each.error_dps[k]), `${plainNumber(level, 3)} °C`, colours.of(level), place),
           ),
         ),
         { ...measured, marker: { ...markerOf(measured), size: 4 } },

@@ -75,7 +75,7 @@ function twoVersions(comparisons, versions, axis) {
     /** @type {Axes} */
     const axes = {
       x: ["rate, deg/s", span(all.flatMap((rows) => rows.rate))],
-      y: ["deg C", span(all.flatMap((rows) => rows.temperature_c))],
+      y: ["°C", span(all.flatMap((rows) => rows.temperature_c))],
       z: ["residual, deg/s", reach],
     };
     const bar = {
@@ -132,7 +132,7 @@ function modelAndResidual(comparison, state) {
     /** @type {Axes} */
     const axes = {
       x: ["rate, deg/s", span(rows.rate)],
-      y: ["deg C", span(rows.temperature_c)],
+      y: ["°C", span(rows.temperature_c)],
       z: ["error, deg/s", reach],
     };
     return {
@@ -148,7 +148,7 @@ function modelAndResidual(comparison, state) {
           x: alongRate(each, each.error_dps)[0],
           y: each.level,
           z: each.error_dps,
-          hovertemplate: "%{x:.4g} deg/s, %{y:.3g} deg C<br>modelled %{z:.4g} deg/s<extra></extra>",
+          hovertemplate: "%{x:.4g} deg/s, %{y:.3g} °C<br>modelled %{z:.4g} deg/s<extra></extra>",
         })),
         dots(rows, rows.measured_error_dps, "measured", "scene"),
         residualSurface(rows, shared, "scene2"),
@@ -184,7 +184,7 @@ const dots = (rows, z, label, scene) => ({
   z,
   marker: { size: 2.5, color: colour("text") },
   customdata: rows.dataset,
-  hovertemplate: `data set %{customdata}<br>%{x:.4g} deg/s, %{y:.3g} deg C<br>${label} %{z:.4g} deg/s<extra></extra>`,
+  hovertemplate: `data set %{customdata}<br>%{x:.4g} deg/s, %{y:.3g} °C<br>${label} %{z:.4g} deg/s<extra></extra>`,
 });
 
 /**
