@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 
 #: Limits that the project has set itself.
 LIMITS = {
-    "first_view_s": 1.0, "outlined_after_pick_ms": 100.0, "trace_s": 1.0, "first_view_kb": 1500.0, "later_view_kb": 50.0,
+    "first_view_s": 1.0, "outlined_after_pick_ms": 100.0, "trace_s": 1.0, "first_view_kb": 1500.0,
+    "later_view_kb": 50.0,
 }  # fmt: skip
 RUNS = 5
 #: On a busy machine a fit of 4.7 million readings takes minutes.
