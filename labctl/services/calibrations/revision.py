@@ -28,7 +28,7 @@ from labctl.recording import Recording
 from labctl.services.cache import RecentResults, cached
 from labctl.services.calibrations.comparison import worse_than_before
 from labctl.services.calibrations.fitting import days_of, reference_of, several
-from labctl.services.calibrations.next_version import keep_next_version
+from labctl.services.calibrations.next_version import answer_of, keep_next_version
 from labctl.services.criticism.evaluation import model_of
 from labctl.services.criticism.measurements import Measurements, measurements_of
 from labctl.services.criticism.residuals import residual_columns
@@ -226,7 +226,7 @@ def _keep(store: Store, serial: str, change: _Change, at: datetime) -> ImproveRe
             parent, recording, after.fitted.model.name, calibration.to_bytes(), calibration.hash, answer, recordings
         )
 
-    return ImproveResponse.model_validate(keep_next_version(store, serial, at, build).answer, extra="forbid")
+    return ImproveResponse.model_validate(answer_of(keep_next_version(store, serial, at, build)), extra="forbid")
 
 
 def plausible(result: FitResult, technology: str) -> dict[str, UsualRange]:
