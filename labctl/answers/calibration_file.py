@@ -93,6 +93,8 @@ class CertificationJson(TypedDict):
     """Date until which the certification is valid, ISO 8601; null: no date."""
     calibration_hash: str
     """SHA-256 of the calibration without its certification."""
+    cause_not_known: NotRequired[list[str]]
+    """Of which parts of the model the cause is not known though the error is corrected, in sentences; absent: none."""
 
 
 class CalibrationJson(TypedDict):

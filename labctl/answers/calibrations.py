@@ -43,6 +43,7 @@ from labctl.answers.fixed_coefficients import FixedCoefficients
 from labctl.answers.inspection import WARNINGS, DataWarning
 from labctl.answers.joint import JointJson
 from labctl.answers.poses import PosesJson
+from labctl.answers.recording_head import OutputUnit
 from labctl.answers.residuals import ResidualColumns
 
 ACCEPT = (
@@ -186,6 +187,11 @@ class FittedResponse(ResponseModel):
     model: ModelResponse = Field(description="The effects of the fitted model.")
     axes: dict[str, AxisCoefficients] = Field(
         description="For each axis: the coefficients with value, standard uncertainty u, and unit."
+    )
+    output: dict[str, OutputUnit] = Field(
+        default_factory=dict,
+        description="For each axis: its nominal output, rate_dps = (output - offset) / scale. Coefficients of the "
+        "scale factor are relative to `scale`.",
     )
     error: ErrorFigures = Field(description="Errors of the model before and after compensation, deg/s.")
     validity: Validity = Field(description="Rates and temperatures over which the model was calibrated.")

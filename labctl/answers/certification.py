@@ -39,6 +39,10 @@ def _due_days(days: int) -> int:
 
 
 DueDays = Annotated[int, AfterValidator(_due_days), Field(json_schema_extra={"minimum": 0, "maximum": MAX_DUE_DAYS})]
+CAUSE_NOT_KNOWN = (
+    "What an adequate model does not show, in sentences: of effects that the data could not tell from others when they "
+    "were added the error is corrected, the cause is not known; a formula is a description and no cause."
+)
 DUE_FROM = "Source of the number of days; null: no number is given, and there is no due date."
 WHEN = "Time of the verdict, which is the time of the certification."
 NO_VERDICT = (
@@ -124,6 +128,7 @@ class AssessmentResponse(ResponseModel):
     verdict_reason: str = Field(description="Why there is no verdict; empty if there is one.")
     verdict_recording: int | None = Field(description="Recording that the verdict is of; null: there is no verdict.")
     verdict_text: str = Field(description="The verdict in words; empty if there is none.")
+    cause_not_known: list[str] = Field(default_factory=list, description=CAUSE_NOT_KNOWN)
     error: CertifiedErrors = Field(description="Errors that the version states, deg/s.")
     any_axis: dict[str, AnyAxisUncertainty] = Field(
         description="For each output: its largest U in use, or why it is unknown, which is no objection; empty: the "
@@ -197,6 +202,7 @@ class CertificationResponse(ResponseModel):
     )
     verdict_at: datetime | None = Field(default=None, description=WHEN)
     verdict_text: str | None = Field(default=None, description="The verdict in words.")
+    cause_not_known: list[str] = Field(default_factory=list, description=CAUSE_NOT_KNOWN)
     error: CertifiedErrors | None = Field(
         default=None, description="Errors that the version stated at its certification, deg/s; null: not kept."
     )

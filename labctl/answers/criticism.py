@@ -332,6 +332,11 @@ class CriticismResponse(ResponseModel):
         description="Effects of an adequate model that these data could not tell from others when they were added: the "
         "error is corrected, the cause is not known.",
     )
+    cause_not_known: list[str] = Field(
+        default_factory=list,
+        description="The same in sentences, and one for each formula that the model contains, which is a description "
+        "and no cause; also in `text`, behind the verdict.",
+    )
     laws: list[ProposedLaw] = Field(
         default_factory=list,
         description="Only for unexplained: at most five formulas that describe the residual and predict what is left "

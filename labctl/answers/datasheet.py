@@ -1,4 +1,4 @@
-"""The data sheet of a unit: measured characteristics beside specified ones."""
+"""The performance sheet of a unit: measured characteristics beside specified ones."""
 
 from __future__ import annotations
 
@@ -28,10 +28,11 @@ class MeasuredUnder(ResponseModel):
 
 
 class Characteristic(ResponseModel):
-    """One line of a data sheet."""
+    """One line of a performance sheet."""
 
     id: str = Field(description="Identifier of the characteristic, for programs.")
     title: str = Field(description="Name of the characteristic, by IEEE Std 528 or 952.")
+    definition: str = Field(default="", description="How the figure is computed.")
     axis: str = Field(description="Output axis, or pair of axes; empty: the figure is of the whole unit.")
     along: str = Field(
         default="", description="Only for the g-sensitivity: the axis along which the specific force acts; else empty."
@@ -60,18 +61,19 @@ class Characteristic(ResponseModel):
 
 
 class DatasheetResponse(ResponseModel):
-    """A unit in the terms of IEEE Std 528 and 952."""
+    """The performance sheet of a unit, in the terms of IEEE Std 528 and 952."""
 
     serial: Serial
     model: UnitModel
     technology: str | None = Field(description=TECHNOLOGY)
     recordings: list[int] = Field(
-        description="Ids of the recordings from which the values in this data sheet were computed, ascending."
+        description="Ids of the recordings from which the values in this sheet were computed, ascending."
     )
     characteristics: list[Characteristic] = Field(description="Each characteristic, by axis.")
     passed: bool | None = Field(
         description="Whether every figure that is both specified and measured passes; null: there is no such figure."
     )
     not_measured: list[str] = Field(description="Ids of characteristics without a value on any axis.")
+    basis: str = Field(default="", description="What the figures are of, and how coefficients of a calibration differ.")
     decision_rule: str = Field(description="Rule by which `passed` was decided.")
     text: Sentences

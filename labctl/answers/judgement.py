@@ -28,6 +28,8 @@ class JudgementDetail(TypedDict, total=False):
     """Why there is no verdict; empty if there is one."""
     verdict_text: str
     """The verdict in words; empty if there is none."""
+    cause_not_known: list[str]
+    """What the verdict does not show, in sentences: which of several effects is the cause."""
     error: dict[str, float | None]
     """Name -> RMS error that the version states, deg/s; null: unknown."""
     objections: list[Objection]

@@ -31,6 +31,11 @@ def nominal_output(document: Mapping[str, object]) -> NominalOutput:
     return line
 
 
+def nominal_text(unit: str, offset: float, scale: float) -> str:
+    """Return a nominal line as commands and certificates write it: scale factor 0.022 V per deg/s, 2.5 V at rest."""
+    return f"scale factor {scale:.6g} {unit} per deg/s, {offset:.6g} {unit} at rest"
+
+
 def _number(value: object) -> float:
     if not isinstance(value, int | float | str):
         raise TypeError(f"{str(value)[:80]} is no number; correct it")

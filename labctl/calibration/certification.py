@@ -41,6 +41,8 @@ class Certification:
     at: datetime
     due: datetime | None
     calibration_hash: str
+    #: What the verdict on the version does not show: of which parts of its model the cause is not known, in sentences.
+    cause_not_known: tuple[str, ...] = ()
 
     def is_overdue(self, now: datetime) -> bool:
         """Whether the date until which it is valid has passed at an aware time."""
@@ -61,11 +63,13 @@ class Certification:
             )
         return ""
 
-    def to_json(self) -> dict[str, str | None]:
+    def to_json(self) -> dict[str, str | list[str] | None]:
         """Return it as the value of `certification` in a calibration file."""
+        unknown = {"cause_not_known": list(self.cause_not_known)} if self.cause_not_known else {}
         return {
             "state": self.state, "by": self.by, "reason": self.reason, "at": self.at.isoformat(),
             "due": self.due.isoformat() if self.due else None, "calibration_hash": self.calibration_hash,
+            **unknown,
         }  # fmt: skip
 
 
@@ -76,9 +80,13 @@ def read_certification(document: Mapping[str, object]) -> Certification:
     state: State | None = next((each for each in states if each == stated), None)
     if state is None:
         raise ValueError(f"the state is {str(stated)[:80]!r}, but must be one of {', '.join(states)}")
+    unknown = document.get("cause_not_known", [])
+    if not isinstance(unknown, list):
+        raise TypeError(f"cause_not_known is {str(unknown)[:80]!r}, but must be a list of sentences")
     return Certification(
         state, str(document["by"]), str(document["reason"]), _instant(document["at"]),
         None if due is None else _instant(due), str(document["calibration_hash"]),
+        tuple(map(str, unknown)),
     )  # fmt: skip
 
 

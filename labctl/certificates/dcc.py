@@ -6,7 +6,7 @@ from itertools import groupby
 from xml.etree import ElementTree as ET
 
 from labctl.certificates.document import Certificate, Condition, Conformity, SensorResult, StandardUsed, StateOfItem
-from labctl.certificates.readable import reference_text, uncertainty_text
+from labctl.certificates.readable import nominal_of, reference_text, uncertainty_text
 from labctl.certificates.units import readable
 from labctl.certificates.xml_parts import DCC, ENGLISH, SI, child, contact, optional, quantity, referred, texts
 
@@ -207,6 +207,7 @@ def _method(made: ET.Element, certificate: Certificate) -> None:
         made,
         "description",
         f"Error model {method.model}: {', '.join(method.effects)}.",
+        *([f"Nominal {nominal}."] if (nominal := nominal_of(certificate)) else []),
         f"Recordings: {', '.join(map(str, method.recordings))}.",
         f"Additions to, deviations or exclusions from the method: {method.deviations}",
     )

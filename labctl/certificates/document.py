@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from instruments.laboratory import Laboratory
 from labctl.answers.certificates import Customer, DecisionRule, Use
+from labctl.answers.output_units import nominal_text
 from labctl.canonical_json import canonical
 
 SCHEMA = "labctl-certificate/1"
@@ -68,12 +69,26 @@ class StandardUsed(Part):
 
 
 class Condition(Part):
-    """An environmental condition as it was measured: least and largest mean of a data set, or reading in the room."""
+    """An environmental condition as it was measured: least and largest reading, or mean where means were recorded."""
 
     name: str
     unit: str
     low: float
     high: float
+
+
+class NominalScale(Part):
+    """How an output becomes a rate before it is corrected: (output - offset) / scale."""
+
+    axis: str
+    unit: str
+    offset: float  #: output at rest, in `unit`
+    scale: float  #: output per deg/s, in `unit` per deg/s
+
+    @property
+    def text(self) -> str:
+        """The line as the certificate states it."""
+        return f"axis {self.axis}: {nominal_text(self.unit, self.offset, self.scale)}"
 
 
 class Contribution(Part):
@@ -319,6 +334,7 @@ class Certificate(Part):
     environment: tuple[Condition, ...]
     standards: tuple[StandardUsed, ...]
     uncertainty: Uncertainty
+    nominal: tuple[NominalScale, ...] = ()  #: none: issued before it was stated
     results: tuple[ResultPoint, ...]
     any_axis: tuple[AnyAxisResult, ...] = ()  #: none: issued before it was stated
     coefficients: tuple[CoefficientResult, ...]

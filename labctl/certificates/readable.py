@@ -219,12 +219,18 @@ def _method(certificate: Certificate) -> list[list[str]]:
         ["Method", method.name],
         ["Procedure", method.procedure],
         ["Error model", f"{method.model}: {', '.join(method.effects)}"],
+        ["Nominal scale factor", nominal_of(certificate)],
         [f"Recording{several}", ", ".join(map(str, method.recordings))],
         ["Software", method.software],
         ["Additions to, deviations or exclusions from the method", method.deviations],
         ["Results of external providers", certificate.external],
     ]
     return [row for row in rows if row[1]]
+
+
+def nominal_of(certificate: Certificate) -> str:
+    """Return the nominal line of each axis; empty for a certificate that was issued before it was stated."""
+    return "; ".join(_signed(readable(each.text)) for each in certificate.nominal)
 
 
 def uncertainty_text(certificate: Certificate) -> str:

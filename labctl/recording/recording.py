@@ -40,10 +40,14 @@ class Recording:
         return raw if output is None else (raw - output.offset) / output.scale
 
 
+#: The thermometer of a unit, and what stands in for it.
+TEMPERATURES_OF_UNIT = ("temperature_c", "chamber_c")
+
+
 def temperature_of(columns: Columns) -> NDArray[np.float64] | None:
     """Return how warm the unit was, (n,) deg C, or None where no column gives it.
 
     The one place that decides: the unit's own thermometer, and where it has none the chamber's stands in for it.
     """
-    temperatures_c = columns.get("temperature_c", columns.get("chamber_c"))
+    temperatures_c = next((columns[name] for name in TEMPERATURES_OF_UNIT if name in columns), None)
     return None if temperatures_c is None else np.asarray(temperatures_c, dtype=np.float64)

@@ -244,6 +244,7 @@ class ServedCalibration:
     certificate: str | None = None  #: number of the newest certificate of the version; None: it has none
     withdrawal: Withdrawal | None = None  #: of that certificate
     act_number: int | None = None
+    judgement: str | None = None  #: `JudgementDetail` that was kept with the act, as JSON: not every reader needs it
 
 
 @dataclass(frozen=True)

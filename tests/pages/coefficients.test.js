@@ -3,7 +3,12 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { columnsBeside, differenceText, termsText } from "../../labctl/web/static/js/unit/coefficient_table.js";
+import {
+  columnsBeside,
+  differenceText,
+  nominalText,
+  termsText,
+} from "../../labctl/web/static/js/unit/coefficient_table.js";
 
 /** @param {Record<string, unknown>} coefficients */
 const version = (coefficients) => /** @type {any} */ ({ axes: { x: { coefficients } } });
@@ -56,4 +61,11 @@ test("the reference temperature and the parameters of effects are said beside th
   const sine = { terms: [term("sine_response", { k: 0.67, k_squared_z: 0.064 })] };
   const coefficients = { bias: {}, k: {}, k_squared: {} };
   assert.equal(termsText(/** @type {any} */ ({ axes: { z: { coefficients } }, model: sine })), "");
+});
+
+test("the nominal scale factor of each output is stated with its unit", () => {
+  const output = { z: { unit: "mV", scale: -22, offset: 2500 }, x: { unit: "deg/s", scale: 1, offset: 0 } };
+  const said = nominalText(/** @type {any} */ ({ output }));
+  assert.ok(said.endsWith(": axis z: −22 mV per deg/s, 2500 mV at rest; axis x: 1 deg/s per deg/s, 0 deg/s at rest."));
+  assert.equal(nominalText({ output: {} }), "");
 });

@@ -108,7 +108,7 @@ async def trend(
     return await while_connected(request, service, trend_unit, serial, version, limit_dps)
 
 
-@router.get("/units/{serial}/datasheet", summary="A unit's data sheet", tags=["criticism"])
+@router.get("/units/{serial}/datasheet", summary="A unit's performance sheet", tags=["criticism"])
 async def unit_datasheet(request: Request, serial: str, service: ServiceDep) -> DatasheetResponse:
     """Characteristics in the terms of IEEE Std 528 and 952 with uncertainty, conditions and recording, beside the
     specified values; what is not measured names the recipe that measures it."""

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from labctl.answers.certification import CertificationResponse, ReleaseRequestResponse
+from labctl.answers.output_units import nominal_text
 from labctl.cli.output import console, format_number, print_heading, print_warnings, table
 from labctl.cli.printing.joint import print_joint
 from labctl.fitting.numeric.rounding import rounded_to_uncertainty
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from labctl.answers.calibrations import FitResponse
     from labctl.answers.fitted_model import Coefficients, Entry, HeldJson, TypePriorJson
     from labctl.answers.poses import PosesJson
+    from labctl.answers.recording_head import OutputUnit
 
 
 def print_fit(answer: FitResponse) -> None:
@@ -34,6 +36,7 @@ def print_fit(answer: FitResponse) -> None:
     rates = "any rate" if slow is None or fast is None else f"{slow:.4g} to {fast:.4g} deg/s"
     warm = "any temperature (none was measured)" if low is None or high is None else f"{low:.1f} to {high:.1f} deg C"
     console.print(f"  valid              {warm}, {rates}")
+    _print_nominal(answer.output)
     if answer.model.held is not None:
         _print_held(answer.model.held)
     if answer.type_prior is not None:
@@ -60,6 +63,13 @@ def print_fit(answer: FitResponse) -> None:
         console.print(rows)
     if answer.poses is not None:
         print_poses(answer.poses)
+
+
+def _print_nominal(outputs: Mapping[str, OutputUnit]) -> None:
+    """Print the nominal scale factor of each axis, to which the coefficients are relative."""
+    for axis, output in outputs.items():
+        name = f"nominal, axis {axis}"
+        console.print(f"  {name:<18} {nominal_text(output.unit, output.offset, output.scale)}", soft_wrap=True)
 
 
 def _print_type_prior(prior: TypePriorJson) -> None:
@@ -125,6 +135,7 @@ def print_certification(answer: CertificationResponse | ReleaseRequestResponse) 
     console.print(f"{answer.serial} version {answer.version} {done} ({_persons(answer)}: {answer.reason})")
     if answer.act == "certify":
         console.print(f"  verdict: {_verdict(answer)}", soft_wrap=True)
+        _print_causes_not_known(answer)
     if answer.uncertainty_unknown:
         text = f"  its uncertainty in use is unknown: {answer.uncertainty_unknown}"
         console.print(text, style="yellow", soft_wrap=True)
@@ -163,6 +174,7 @@ def print_certifications(rows: Sequence[CertificationResponse], waiting: Sequenc
         console.print(line, soft_wrap=True)
         if row.act == "certify":
             console.print(f"  verdict: {_verdict(row)}", soft_wrap=True)
+            _print_causes_not_known(row)
         _print_objections(row)
 
 
@@ -172,6 +184,11 @@ def _verdict(answer: CertificationResponse) -> str:
         when = f", {answer.verdict_at:%Y-%m-%d %H:%M} UTC" if answer.verdict_at else ""
         return f"{answer.verdict} (recording {answer.verdict_recording}{when}): {answer.verdict_text}"
     return f"none: {answer.verdict_reason}" if answer.verdict_reason else "not kept"
+
+
+def _print_causes_not_known(answer: CertificationResponse) -> None:
+    for text in answer.cause_not_known:
+        console.print(f"  cause not known: {text}", soft_wrap=True)
 
 
 def _print_objections(answer: CertificationResponse) -> None:

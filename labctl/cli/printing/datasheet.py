@@ -1,4 +1,4 @@
-"""A unit's data sheet as text."""
+"""A unit's performance sheet as text."""
 
 from __future__ import annotations
 
@@ -49,6 +49,10 @@ def print_datasheet(answer: DatasheetResponse) -> None:
     console.print(rows)
     for text in answer.text:
         console.print(text, soft_wrap=True)
+    measured = {each.title: each.definition for each in answer.characteristics if each.conditions is not None}
+    for title, definition in measured.items():
+        console.print(f"{title}: {definition}", style="dim", soft_wrap=True)
+    console.print(answer.basis, soft_wrap=True)
     console.print(answer.decision_rule, soft_wrap=True)
 
 

@@ -17,6 +17,10 @@ from labctl.fitting.numeric.arrays import Array
 PPM = 1e6
 #: Rates less than this share of the fastest apart are one.
 SAME_RATE = 1e-3
+#: Least range of temperatures over which a change with temperature is stated, K.
+LEAST_SPAN_C = 1.0
+#: Largest condition number of the columns, each of length 1, by which rate and temperature are distinguished.
+MOST_CONDITION = 10.0
 
 
 @dataclass(frozen=True)
@@ -66,7 +70,7 @@ def slope_over(temperature_c: Array, estimates: list[Estimate]) -> Estimate | No
 
     Its uncertainty is the larger one of the scatter about the line and of what the figures' own carry on to the slope.
     """
-    if len(temperature_c) < 2 or float(np.ptp(temperature_c)) < 1.0:
+    if len(temperature_c) < 2 or float(np.ptp(temperature_c)) < LEAST_SPAN_C:
         return None
     columns = np.column_stack([np.ones(len(temperature_c)), temperature_c - temperature_c.mean()])
     values, u, _ = _solved(columns, np.array([estimate.value for estimate in estimates]))
@@ -75,6 +79,26 @@ def slope_over(temperature_c: Array, estimates: list[Estimate]) -> Estimate | No
     carried = float(np.sqrt(np.sum((weights * np.array(known_u)) ** 2))) if len(known_u) == len(estimates) else None
     stated_u = [each for each in (u[1], carried) if each is not None]
     return Estimate(values[1], max(stated_u) if stated_u else None)
+
+
+def changes_with_temperature(
+    rate_dps: Array, temperature_c: Array, output_dps: Array
+) -> tuple[Estimate, Estimate] | None:
+    """Return the change of the bias, deg/s/K, and of the scale factor, 1/K, from m data sets at any temperatures.
+
+    Intercept and slope of one line change linearly with the temperature, by least squares: for temperatures that are no
+    levels with a line each. None with one temperature or one rate, and where rate and temperature changed together, so
+    that a change with one of them looks like a change with the other.
+    """
+    if len(rate_dps) <= 4 or different_rates(rate_dps) < 2 or float(np.ptp(temperature_c)) < LEAST_SPAN_C:
+        return None
+    warmer = temperature_c - temperature_c.mean()
+    columns = np.column_stack([np.ones(len(rate_dps)), rate_dps, warmer, rate_dps * warmer])
+    sizes = np.linalg.norm(columns, axis=0)
+    if not np.all(sizes > 0.0) or np.linalg.cond(columns / sizes) > MOST_CONDITION:
+        return None
+    values, u, _ = _solved(columns, output_dps)
+    return Estimate(values[2], u[2]), Estimate(values[3], u[3])
 
 
 def different_rates(rate_dps: Array) -> int:

@@ -80,10 +80,16 @@ def cross_rates(fitted: FittedModel, coefficients: Mapping[str, Budget]) -> Cros
         other: budget.expanded for other, budget in misalignments.items() if budget is not None and budget.expanded
     }
     if missing := [other for other in unread if other not in expanded]:
-        reason = (
-            f"the misalignment towards {' and '.join(missing)} is not known: measure the unit with this axis up too, "
-            "and fit misalignment"
-        )
-        return {"about": unread, "per_dps": None, "why": reason}
+        return {"about": unread, "per_dps": None, "why": _not_measured_about(missing)}
     size = math.hypot(*(budget.value or 0.0 for budget in misalignments.values() if budget is not None))
     return {"about": unread, "per_dps": half_width(max(expanded.values()), size), "why": ""}
+
+
+def _not_measured_about(axes: Sequence[str]) -> str:
+    """Return that the misalignments towards body axes are not known, and in which mountings they are measured."""
+    several = "s" if len(axes) > 1 else ""
+    mountings = " and ".join(f"with {axis} up" for axis in axes)
+    return (
+        f"the misalignment{several} towards {' and '.join(axes)} {'are' if several else 'is'} not known: turn the unit "
+        f"on the table {mountings} too, and fit misalignment to all of these data sets together"
+    )

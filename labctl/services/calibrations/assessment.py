@@ -43,6 +43,7 @@ def assess(store: Store, serial: str, version: int) -> AssessmentResponse:
         verdict_reason=reason,
         verdict_recording=criticism.recording if criticism else None,
         verdict_text=_sentence(criticism) if criticism else "",
+        cause_not_known=criticism.cause_not_known if criticism else [],
         error=_errors(row),
         any_axis=over_any_axis(read_calibration(row.document)),
         objections=objections,

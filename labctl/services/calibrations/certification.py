@@ -101,8 +101,9 @@ def put_in_force(
     judgement = Judgement(
         known.verdict, known.verdict_recording, at if known.verdict else None, bool(known.objections),
         JudgementDetail(
-            verdict_reason=known.verdict_reason, verdict_text=known.verdict_text, error=known.error.model_dump(),
-            objections=known.objections, due_from=due_from,
+            verdict_reason=known.verdict_reason, verdict_text=known.verdict_text,
+            cause_not_known=known.cause_not_known, error=known.error.model_dump(), objections=known.objections,
+            due_from=due_from,
             uncertainty_unknown="; ".join(dict.fromkeys(each.why for each in known.any_axis.values() if each.why)),
         ),
     )  # fmt: skip

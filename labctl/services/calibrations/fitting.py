@@ -28,7 +28,7 @@ from labctl.fitting.uncertainty import AxisEvidence, evidence_of
 from labctl.recording.info import REFERENCES, measured_at
 from labctl.services.calibrations.certification import certification_response, version_in_force
 from labctl.services.calibrations.comparison import worse_than_raw
-from labctl.services.calibrations.next_version import keep_next_version
+from labctl.services.calibrations.next_version import answer_of, keep_next_version
 from labctl.services.criticism.measurements import Measurements, measurements_of
 from labctl.services.fixed_coefficients import fixed_of
 from labctl.services.recordings.inspection import refuse_wrong
@@ -70,8 +70,7 @@ def fit_unit(store: Store, serial: str, request: FitRequest, at: datetime, *, is
     once: raises Conflict for another one.
     """
     fitted = fitted_unit(store, serial, request, at, is_draft=is_draft)
-    kept_version = keep_next_version(store, serial, at, fitted.build)
-    return FitResponse.model_validate(kept_version.answer, extra="forbid")
+    return FitResponse.model_validate(answer_of(keep_next_version(store, serial, at, fitted.build)), extra="forbid")
 
 
 def fitted_unit(store: Store, serial: str, request: FitRequest, at: datetime, *, is_draft: bool = False) -> FittedUnit:
@@ -196,4 +195,4 @@ def one_version(store: Store, serial: str, version: int) -> VersionResponse | Im
         "due": last.due if last is not None and in_force else None, "certification": last,
     }  # fmt: skip
     kind = ImprovedVersionResponse if "improved_from" in row.answer else VersionResponse
-    return kind.model_validate({**row.answer, **beside})
+    return kind.model_validate({**answer_of(row), **beside})

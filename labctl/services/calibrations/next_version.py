@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from datetime import datetime
 
@@ -44,3 +45,8 @@ def keep_next_version(
             continue
     version = store.calibrations.next_version(serial)
     return store.calibrations.add(serial, at, version, build(version))
+
+
+def answer_of(row: CalibrationRecord) -> dict[str, object]:
+    """Return what was kept of the fit of a version, with the nominal output of each axis, which its document states."""
+    return {**row.answer, "output": json.loads(row.document)["output"]}

@@ -28,7 +28,7 @@ from labctl.recording import Recording
 from labctl.services.cache import RecentResults, cached
 from labctl.services.calibrations.comparison import worse_than_before
 from labctl.services.calibrations.fitting import days_of, reference_of, several
-from labctl.services.calibrations.next_version import keep_next_version, refuse_taken
+from labctl.services.calibrations.next_version import answer_of, keep_next_version, refuse_taken
 from labctl.services.criticism.evaluation import model_of
 from labctl.services.criticism.measurements import Measurements, measurements_of
 from labctl.services.criticism.residuals import residual_columns
@@ -228,7 +228,7 @@ def _keep(store: Store, serial: str, change: _Change, at: datetime, expected: in
         )
 
     kept = keep_next_version(store, serial, at, build, expected)
-    return ImproveResponse.model_validate(kept.answer, extra="forbid")
+    return ImproveResponse.model_validate(answer_of(kept), extra="forbid")
 
 
 def plausible(result: FitResult, technology: str) -> dict[str, UsualRange]:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from typing import Final
 
 from labctl.answers.certification import CalibrationStateResponse, WithdrawnResponse
+from labctl.answers.judgement import JudgementDetail
 from labctl.answers.noise import AllanJson
 from labctl.calibration import read_calibration, with_certification
 from labctl.calibration.certification import Certification, State
@@ -57,7 +59,7 @@ def read_options(lines: Sequence[str], format_name: str) -> dict[str, str]:
 
 
 def _noise(store: Store, document: bytes, wanted: Mapping[str, str]) -> dict[str, str]:
-    """Return the noise of the unit as options, from the recording that its data sheet takes it from."""
+    """Return the noise of the unit as options, from the recording that its performance sheet takes it from."""
     calibration = read_calibration(document)
     try:
         rows = store.recordings.of_unit(calibration.serial)
@@ -198,4 +200,6 @@ def certification_of(served: ServedCalibration) -> Certification | None:
     if (act := served.act) is None:
         return None
     state: State = "in-force" if served.in_force else "revoked" if act.act == "revoke" else "superseded"
-    return Certification(state, act.by, act.reason, act.at, act.due_at, served.hash)
+    detail: JudgementDetail = json.loads(served.judgement or "{}")
+    unknown = tuple(detail.get("cause_not_known", ()))
+    return Certification(state, act.by, act.reason, act.at, act.due_at, served.hash, unknown)

@@ -17,6 +17,7 @@ from labctl.certificates.document import (
     Item,
     ManifestNamed,
     Method,
+    NominalScale,
     Replaced,
     StandardUsed,
     StateOfItem,
@@ -50,7 +51,7 @@ SIMULATED = (
 
 def statements(facts: Facts) -> tuple[str, ...]:
     """Return the statements in order; of a simulated bench that it is simulated first, and none on traceability."""
-    statement_texts = [ITEM_ONLY, TRACEABLE, NOISE, BY_CUSTOMER, WHOLE, *_of_type(facts)]
+    statement_texts = [ITEM_ONLY, TRACEABLE, NOISE, BY_CUSTOMER, WHOLE, *_of_type(facts), *_causes_not_known(facts)]
     return (SIMULATED, *statement_texts[:1], *statement_texts[2:]) if facts.simulated else tuple(statement_texts)
 
 
@@ -84,6 +85,7 @@ def assembled(
         environment=(*evidence.conditions, *evidence.room),
         standards=tuple(_standard(standard) for standard in facts.standards),
         uncertainty=uncertainty,
+        nominal=tuple(_nominal(facts)),
         results=evidence.results.points,
         any_axis=evidence.results.any_axis,
         coefficients=measured.coefficients(facts.calibration),
@@ -150,6 +152,19 @@ def _of_type(facts: Facts) -> Iterator[str]:
             f"The coefficients were estimated from the measurements of this item together with the calibrations of "
             f"{prior['units']} other units of type {prior['type']}; the measured errors are of this item alone."
         )
+
+
+def _nominal(facts: Facts) -> Iterator[NominalScale]:
+    """Yield the nominal line of each output, to which its errors and the coefficients are relative."""
+    for axis, line in facts.calibration.output.items():
+        yield NominalScale(axis=axis, unit=line.unit, offset=line.offset, scale=line.scale)
+
+
+def _causes_not_known(facts: Facts) -> Iterator[str]:
+    """Yield of which parts of the certified model the verdict does not show the cause."""
+    if (act := facts.authorised) is not None and act.judgement is not None:
+        for text in act.judgement.detail.get("cause_not_known", ()):
+            yield f"On the error model: {text}"
 
 
 def _method(facts: Facts) -> Method:

@@ -33,7 +33,7 @@ class Found:
         results = measured.results(store, facts.row, facts.calibration)
         spans = [] if facts.campaign is None else of_campaign(store, facts.campaign.id)
         room = measured.environment_of_room(spans, facts.order.environment)
-        return Found(measurements, results, measured.environment(measurements.points), room, facts.imported)
+        return Found(measurements, results, measured.environment(measurements), room, facts.imported)
 
     def missing(self) -> Iterator[MissingFact]:
         """Yield what is not known of the results, and what makes it known."""

@@ -25,13 +25,14 @@ from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.numeric.degrees_of_freedom import COVERAGE_PROBABILITY
 from labctl.fitting.uncertainty.budget import Budget
-from labctl.recording import Recording
+from labctl.recording.recording import TEMPERATURES_OF_UNIT
 from labctl.services.calibrations.surface import errors_on_grid
 from labctl.services.calibrations.uncertainty import coefficients_at, over_any_axis, places_of, uncertainty_of
 from labctl.services.certificates.missing import MissingFact
 from labctl.services.criticism.measurements import Measurements
 from labctl.services.criticism.verification.of_version import applied_errors, mounting_angles_of
-from labctl.store import CalibrationRecord, RoomSpan, Store
+from labctl.services.recordings.envelopes import envelope_of
+from labctl.store import CalibrationRecord, RecordingRow, RoomSpan, Store
 
 Array = NDArray[np.float64]
 #: A coefficient is the quantity of a budget where both have this value, relative; the budget's is a derivative.
@@ -89,14 +90,32 @@ def environment_of_room(spans: Sequence[RoomSpan], ordered: RoomConditions) -> t
     )
 
 
-def environment(points: Recording) -> tuple[Condition, ...]:
-    """Return the least and the largest mean of each condition that was logged."""
+def environment(measurements: Measurements) -> tuple[Condition, ...]:
+    """Return the least and the largest reading of each condition that was logged; of a recording of means, mean."""
     conditions = []
     for column, (name, unit_symbol) in CONDITIONS.items():
-        values = np.asarray(points.columns.get(column, []), dtype=np.float64)
-        if (values := values[np.isfinite(values)]).size:
-            conditions.append(Condition(name=name, unit=unit_symbol, low=float(values.min()), high=float(values.max())))
+        ends = np.concatenate([_ends_of(measurements, row, column) for row in measurements.rows])
+        if (ends := ends[np.isfinite(ends)]).size:
+            conditions.append(Condition(name=name, unit=unit_symbol, low=float(ends.min()), high=float(ends.max())))
     return tuple(conditions)
+
+
+def _ends_of(measurements: Measurements, row: RecordingRow, column: str) -> Array:
+    """Return least and largest values of a condition of one recording, (n,), whatever their order; none without it.
+
+    The temperature by which the item was fitted has one range: that of its readings, as the calibrated range has it.
+    """
+    columns = measurements.of_each[row.id].columns
+    if column not in columns:
+        return np.empty(0)
+    means = np.asarray(columns[column], dtype=np.float64)
+    if row.kind != "samples":
+        return means
+    if column == next((name for name in TEMPERATURES_OF_UNIT if name in columns), None):
+        inspection = measurements.inspections[row.id]
+        return np.array([*inspection.temperature_low_c, *inspection.temperature_high_c], dtype=np.float64)
+    envelope = envelope_of(measurements.store, row.id, column)
+    return np.concatenate([envelope.low, envelope.high]) if envelope.low.size else means
 
 
 def results(store: Store, row: CalibrationRecord, calibration: Calibration) -> Results:

@@ -40,8 +40,8 @@ def criticise_unit(
     row = version_of(store, serial, version)
     measured = chosen_rows(store, serial, recording, recordings, other_unit=other_unit)
     answer = _cached_criticism(CriticismResponse, store, row, measured, competing)
-    if answer.verdict == "adequate" and row.parent is not None:
-        answer = _with_undistinguished(answer, store, row, measured)
+    if answer.verdict == "adequate":
+        answer = _with_causes_not_known(answer, store, row, measured)
     if not (newer := passed_over(store, measured, recording, recordings)):
         return answer
     from labctl.services.criticism.answer import with_warnings  # noqa: PLC0415  slow to import
@@ -62,20 +62,43 @@ def criticise_seen(
         return evaluate(store, row, measured, (), decimated, seen, plans_next=False)[0]
 
 
-def _with_undistinguished(
+def _with_causes_not_known(
     answer: CriticismResponse, store: Store, row: CalibrationRecord, measured: tuple[RecordingRow, ...]
 ) -> CriticismResponse:
-    """Return an answer that says which effects of its model these data could not tell from others.
+    """Return an answer that says, behind the verdict, of which parts of its model the cause is not known."""
+    undistinguished = _undistinguished(store, row, measured)
+    sentences = [
+        f"These data do not show that the cause is {each['effect']}, which version {row.version} contains: "
+        f"{' or '.join(each['others'])} would explain them as well (criticism of version {row.parent})."
+        for each in undistinguished
+    ] + [
+        f"The formula {term['effect']} of version {row.version} describes the error; it names no cause."
+        for term in row.answer["model"].get("terms", ())
+        if term.get("formula")
+    ]
+    place = len(answer.warnings) + 1
+    return answer.model_copy(
+        update={
+            "undistinguished": undistinguished, "cause_not_known": sentences,
+            "text": [*answer.text[:place], *sentences, *answer.text[place:]],
+        }
+    )  # fmt: skip
+
+
+def _undistinguished(store: Store, row: CalibrationRecord, measured: tuple[RecordingRow, ...]) -> list[Undistinguished]:
+    """Return which effects that a version adds to the one before these data could not tell from others.
 
     Beside an effect that was added, what explains the same looks like noise: only the version before shows it.
     """
+    if row.parent is None:
+        return []
     try:
         before = version_of(store, row.serial, row.parent)
         earlier = _cached_criticism(CriticismResponse, store, before, measured, ())
     except LabctlError:
-        return answer  # the version before cannot be compared with these data
+        return []  # the version before cannot be compared with these data
     if earlier.verdict != "ambiguous":
-        return answer
+        return []
     added = [each for each in row.answer["model"]["effects"] if each not in before.answer["model"]["effects"]]
     groups = {suspect["effect"]: suspect["alias_group"] for suspect in earlier.suspects}
     undistinguished: list[Undistinguished] = []
@@ -83,13 +106,7 @@ def _with_undistinguished(
         others = [each for each in groups.get(effect, ()) if each in earlier.named and each not in added]
         if effect in earlier.named and others:
             undistinguished.append({"effect": effect, "others": others})
-    sentences = [
-        f"These data do not show that the cause is {each['effect']}, which version {row.version} contains: "
-        f"{' or '.join(each['others'])} would explain them as well (criticism of version {before.version})."
-        for each in undistinguished
-    ]
-    first, *rest = answer.text
-    return answer.model_copy(update={"undistinguished": undistinguished, "text": [first, *sentences, *rest]})
+    return undistinguished
 
 
 def residuals_unit(

@@ -1,1 +1,1 @@
-"""The data sheet of a unit, from its own recordings."""
+"""The performance sheet of a unit, from its own recordings."""

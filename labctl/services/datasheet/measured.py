@@ -1,4 +1,4 @@
-"""Figures of a data sheet from the data sets of one recording, of the uncorrected outputs."""
+"""Figures of a performance sheet from the data sets of one recording, of the uncorrected outputs."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from labctl.fitting.characteristics.scale_factor import (
     PPM,
     StraightLine,
     asymmetry_ppm,
+    changes_with_temperature,
     different_rates,
     nonlinearity_ppm,
     slope_over,
@@ -145,9 +146,14 @@ def _over_temperature(
         for level in range(len(seen.level_c))
         if (line := seen.line(axis, about_axis & (seen.level == level))) is not None
     }
-    temperature_c = seen.level_c[list(lines)]
-    bias = slope_over(temperature_c, [line.bias_dps for line in lines.values()])
-    scale = slope_over(temperature_c, [line.scale_factor for line in lines.values()])
+    if len(lines) > 1:
+        temperature_c = seen.level_c[list(lines)]
+        bias = slope_over(temperature_c, [line.bias_dps for line in lines.values()])
+        scale = slope_over(temperature_c, [line.scale_factor for line in lines.values()])
+    else:  # temperatures without levels, or levels without rates enough for a line each
+        rate, warm_c = seen.data.true_rate_dps(axis)[about_axis], seen.data.temperature_c[about_axis]
+        changes = changes_with_temperature(rate, warm_c, seen.data.outputs[axis][about_axis])
+        bias, scale = changes or (None, None)
     if bias is not None:
         yield Figure("bias_temperature", axis, bias, about_axis)
     if scale is not None:

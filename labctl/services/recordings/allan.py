@@ -25,8 +25,8 @@ NEEDED = ("dataset", "t_s", "run", "mounting", "position", "table_rate_dps", "te
 def allan_unit(store: Store, recording: int, dataset: int | None) -> AllanResponse:
     """Return the Allan deviation of a data set, or of the longest section at rest and at one temperature.
 
-    Its figures enter data sheets and the uncertainty in use, so the section has no data set that was measured to verify
-    a calibration; one of these can be asked for by its number.
+    Its figures enter performance sheets and the uncertainty in use, so the section has no data set that was measured
+    to verify a calibration; one of these can be asked for by its number.
 
     Raises NotFound, BadInput for a recording without readings, NotEnoughData.
     """
@@ -55,7 +55,7 @@ def allan_unit(store: Store, recording: int, dataset: int | None) -> AllanRespon
 def noise_of_recordings(store: Store, rows: Sequence[RecordingRow]) -> AllanResponse | None:
     """Return the Allan deviation of the recording with the longest data set at rest; None where none has one.
 
-    Data sheets and exports take their N, B and K from here, so that both state the same.
+    Performance sheets and exports take their N, B and K from here, so that both state the same.
     """
     at_rest = [(_longest_rest(store, row), row) for row in rows if row.kind == "samples"]
     for readings, row in sorted(at_rest, key=lambda each: each[0], reverse=True):

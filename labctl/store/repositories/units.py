@@ -253,6 +253,7 @@ _CERTIFICATE = (
     _Z.number.label("certificate"), _W.by.label("w_by"), _W.by_key.label("w_key"), _W.reason.label("w_reason"),
     _W.at.label("w_at"), _W.certification_id.label("w_act"),
 )  # fmt: skip
+_SERVED = (*_ACT, sa.cast(_X.assessment, sa.Text).label("judgement"), *_CERTIFICATE)
 
 
 def _with_certificate(joined: sa.FromClause) -> sa.Join:
@@ -271,7 +272,7 @@ def _with_certificate(joined: sa.FromClause) -> sa.Join:
 def _served_in_force() -> sa.Select[*tuple[Any, ...]]:
     of = sa.and_(_X.serial == _C.serial, _X.version == _C.version)
     return (
-        sa.select(_C.document, _C.hash, _X.id.label("act_id"), _X.id.label("last_id"), *_ACT, *_CERTIFICATE)
+        sa.select(_C.document, _C.hash, _X.id.label("act_id"), _X.id.label("last_id"), *_SERVED)
         .select_from(_with_certificate(tables.calibrations.join(tables.certifications, of)))
         .where(_X.id == _LAST, _X.act == "certify")
     )
@@ -287,7 +288,7 @@ def _served_together(*, is_shared: bool) -> sa.Select[*tuple[Any, ...]]:
         .group_by(inner.c.serial)
     )
     return (
-        sa.select(_C.serial, _C.document, _C.hash, _X.id.label("act_id"), _X.id.label("last_id"), *_ACT, *_CERTIFICATE)
+        sa.select(_C.serial, _C.document, _C.hash, _X.id.label("act_id"), _X.id.label("last_id"), *_SERVED)
         .select_from(_with_certificate(tables.calibrations.join(tables.certifications, of)))
         .where(_X.id.in_(last), _X.act == "certify")
     )
@@ -301,7 +302,7 @@ def _served_version() -> sa.Select[*tuple[Any, ...]]:
         .scalar_subquery()
     )
     return (
-        sa.select(_C.document, _C.hash, _X.id.label("act_id"), _LAST.label("last_id"), *_ACT, *_CERTIFICATE)
+        sa.select(_C.document, _C.hash, _X.id.label("act_id"), _LAST.label("last_id"), *_SERVED)
         .select_from(_with_certificate(tables.calibrations.outerjoin(tables.certifications, _X.id == newest)))
         .where(_C.serial == sa.bindparam("serial"), _C.version == sa.bindparam("version"))
     )
@@ -386,7 +387,8 @@ def _served(serial: str, row: sa.Row[*tuple[Any, ...]]) -> ServedCalibration:
     gone = None
     if row.w_by is not None:
         gone = Withdrawal(row.w_by, row.w_key, row.w_reason, row.w_at, row.w_act)
-    return ServedCalibration(bytes(row.document), str(row.hash), act, in_force, row.certificate, gone, row.act_id)
+    document, hash_ = bytes(row.document), str(row.hash)
+    return ServedCalibration(document, hash_, act, in_force, row.certificate, gone, row.act_id, row.judgement)
 
 
 def _act(serial: str, row: sa.Row[*tuple[Any, ...]]) -> CertificationRow:

@@ -657,7 +657,7 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * A unit's data sheet
+         * A unit's performance sheet
          * @description Characteristics in the terms of IEEE Std 528 and 952 with uncertainty, conditions and recording, beside the
          *     specified values; what is not measured names the recipe that measures it.
          */
@@ -3406,6 +3406,11 @@ export interface components {
              * @description The verdict in words; empty if there is none.
              */
             verdict_text: string;
+            /**
+             * Cause Not Known
+             * @description What an adequate model does not show, in sentences: of effects that the data could not tell from others when they were added the error is corrected, the cause is not known; a formula is a description and no cause.
+             */
+            cause_not_known: string[];
             /** @description Errors that the version states, deg/s. */
             error: components["schemas"]["CertifiedErrors"];
             /**
@@ -5242,6 +5247,11 @@ export interface components {
              * @description The verdict in words.
              */
             verdict_text: string | null;
+            /**
+             * Cause Not Known
+             * @description What an adequate model does not show, in sentences: of effects that the data could not tell from others when they were added the error is corrected, the cause is not known; a formula is a description and no cause.
+             */
+            cause_not_known: string[];
             /** @description Errors that the version stated at its certification, deg/s; null: not kept. */
             error: components["schemas"]["CertifiedErrors"] | null;
             /**
@@ -5470,7 +5480,7 @@ export interface components {
         };
         /**
          * Characteristic
-         * @description One line of a data sheet.
+         * @description One line of a performance sheet.
          */
         Characteristic: {
             /**
@@ -5483,6 +5493,12 @@ export interface components {
              * @description Name of the characteristic, by IEEE Std 528 or 952.
              */
             title: string;
+            /**
+             * Definition
+             * @description How the figure is computed.
+             * @default
+             */
+            definition: string;
             /**
              * Axis
              * @description Output axis, or pair of axes; empty: the figure is of the whole unit.
@@ -6558,6 +6574,11 @@ export interface components {
              */
             undistinguished: components["schemas"]["Undistinguished"][];
             /**
+             * Cause Not Known
+             * @description The same in sentences, and one for each formula that the model contains, which is a description and no cause; also in `text`, behind the verdict.
+             */
+            cause_not_known: string[];
+            /**
              * Laws
              * @description Only for unexplained: at most five formulas that describe the residual and predict what is left out of the fit better than the model, the likeliest first. A law is a description, and no cause.
              */
@@ -6933,7 +6954,7 @@ export interface components {
         };
         /**
          * DatasheetResponse
-         * @description A unit in the terms of IEEE Std 528 and 952.
+         * @description The performance sheet of a unit, in the terms of IEEE Std 528 and 952.
          */
         DatasheetResponse: {
             /**
@@ -6953,7 +6974,7 @@ export interface components {
             technology: string | null;
             /**
              * Recordings
-             * @description Ids of the recordings from which the values in this data sheet were computed, ascending.
+             * @description Ids of the recordings from which the values in this sheet were computed, ascending.
              */
             recordings: number[];
             /**
@@ -6971,6 +6992,12 @@ export interface components {
              * @description Ids of characteristics without a value on any axis.
              */
             not_measured: string[];
+            /**
+             * Basis
+             * @description What the figures are of, and how coefficients of a calibration differ.
+             * @default
+             */
+            basis: string;
             /**
              * Decision Rule
              * @description Rule by which `passed` was decided.
@@ -8684,6 +8711,13 @@ export interface components {
             axes: {
                 [key: string]: components["schemas"]["AxisCoefficients"];
             };
+            /**
+             * Output
+             * @description For each axis: its nominal output, rate_dps = (output - offset) / scale. Coefficients of the scale factor are relative to `scale`.
+             */
+            output: {
+                [key: string]: components["schemas"]["OutputUnit"];
+            };
             /** @description Errors of the model before and after compensation, deg/s. */
             error: components["schemas"]["ErrorFigures"];
             /** @description Rates and temperatures over which the model was calibrated. */
@@ -10020,6 +10054,13 @@ export interface components {
             axes: {
                 [key: string]: components["schemas"]["AxisCoefficients"];
             };
+            /**
+             * Output
+             * @description For each axis: its nominal output, rate_dps = (output - offset) / scale. Coefficients of the scale factor are relative to `scale`.
+             */
+            output: {
+                [key: string]: components["schemas"]["OutputUnit"];
+            };
             /** @description Errors of the model before and after compensation, deg/s. */
             error: components["schemas"]["ErrorFigures"];
             /** @description Rates and temperatures over which the model was calibrated. */
@@ -10121,6 +10162,13 @@ export interface components {
              */
             axes: {
                 [key: string]: components["schemas"]["AxisCoefficients"];
+            };
+            /**
+             * Output
+             * @description For each axis: its nominal output, rate_dps = (output - offset) / scale. Coefficients of the scale factor are relative to `scale`.
+             */
+            output: {
+                [key: string]: components["schemas"]["OutputUnit"];
             };
             /** @description Errors of the model before and after compensation, deg/s. */
             error: components["schemas"]["ErrorFigures"];
@@ -12960,6 +13008,13 @@ export interface components {
              */
             axes: {
                 [key: string]: components["schemas"]["AxisCoefficients"];
+            };
+            /**
+             * Output
+             * @description For each axis: its nominal output, rate_dps = (output - offset) / scale. Coefficients of the scale factor are relative to `scale`.
+             */
+            output: {
+                [key: string]: components["schemas"]["OutputUnit"];
             };
             /** @description Errors of the model before and after compensation, deg/s. */
             error: components["schemas"]["ErrorFigures"];
@@ -16796,6 +16851,13 @@ export interface components {
              */
             axes: {
                 [key: string]: components["schemas"]["AxisCoefficients"];
+            };
+            /**
+             * Output
+             * @description For each axis: its nominal output, rate_dps = (output - offset) / scale. Coefficients of the scale factor are relative to `scale`.
+             */
+            output: {
+                [key: string]: components["schemas"]["OutputUnit"];
             };
             /** @description Errors of the model before and after compensation, deg/s. */
             error: components["schemas"]["ErrorFigures"];

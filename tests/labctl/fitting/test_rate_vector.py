@@ -155,6 +155,22 @@ def test_about_an_axis_that_was_never_turned_nothing_is_promised() -> None:
     assert "the unit was not turned about" in bounds["z"]["why"]
 
 
+@pytest.mark.parametrize(
+    ("positions", "said"),
+    [
+        (("z",), "the misalignments towards x and y are not known: turn the unit on the table with x up and with y up"),
+        (("z", "x"), "the misalignment towards y is not known: turn the unit on the table with y up too"),
+    ],
+)
+def test_the_axes_that_were_never_up_are_named(positions: tuple[str, ...], said: str) -> None:
+    result, evidence, bench = known(measured(positions=positions, outputs=("z",)))
+    budgets = coefficient_budgets(result.fitted, 20.0, evidence=evidence, name="unit", bench=bench)["z"]
+    stated = cross_rates(result.fitted, budgets)
+    assert stated is not None
+    assert stated["per_dps"] is None
+    assert stated["why"].startswith(said)
+
+
 def test_a_version_that_did_not_store_the_mountings_says_to_fit_again() -> None:
     result, evidence, bench = known_of_ideal()
     records = {axis: one.to_json() for axis, one in evidence.items()}

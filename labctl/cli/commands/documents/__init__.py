@@ -1,1 +1,1 @@
-"""Commands that write documents: certificates, data sheets, uncertainty budgets, reproductions of papers."""
+"""Commands that write documents: certificates, performance sheets, uncertainty budgets, reproductions of papers."""

@@ -16,12 +16,12 @@ from labctl.cli.printing.datasheet import print_datasheet
 def datasheet(
     serial: Serial,
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="FILE", help="Write the data sheet to a file, as JSON.")
+        Path | None, typer.Option("--out", metavar="FILE", help="Write the sheet to a file, as JSON.")
     ] = None,
     as_json: Json = False,
     database: Database = None,
 ) -> None:
-    """Show the data sheet of a unit from its recordings; exit 1 if a specified value is not kept."""
+    """Show the performance sheet of a unit from its recordings; exit 1 if it does not keep the maker's data sheet."""
     from labctl.services.datasheet.sheet import datasheet as datasheet_of
     from labctl.services.read_access import open_readonly
 

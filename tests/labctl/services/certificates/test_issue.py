@@ -21,8 +21,9 @@ from labctl.services.certificates.facts import facts_of
 from labctl.services.certificates.issue import CertificateRefused, issue, missing_facts
 from labctl.services.certificates.missing import MissingFacts
 from labctl.services.certificates.served import certificate_file, list_certificates
-from labctl.store import Store, copy_database, open_store
+from labctl.store import Judgement, Store, copy_database, open_store
 from tests.helpers.certificates import AT, ORDER, SERIAL, add_version, issued, request, simulated
+from tests.helpers.simulated_recordings import single_axis
 
 FORMATS = ("pdf", "xml", "json")
 
@@ -127,6 +128,34 @@ def test_the_same_facts_give_the_same_bytes(empty: Store) -> None:
     again = issue(empty, SERIAL, add_version(empty), request(), AT)
     assert again == answer
     assert empty.certificates.forms(again.number) == forms
+
+
+def test_conditions_and_results_have_one_range_of_the_items_temperature(empty: Store) -> None:
+    version = add_version(empty, single_axis(1))
+    number = issue(empty, SERIAL, version, request(), AT).number
+    document = json.loads(certificate_file(empty, SERIAL, version, "json").content)
+    temperatures_c = [each["temperature_c"] for each in document["results"]]
+    (item,) = [each for each in document["environment"] if each["name"] == "Temperature of the item"]
+    assert (item["low"], item["high"]) == (min(temperatures_c), max(temperatures_c)), number
+    readings = empty.recordings.samples(empty.calibrations.get(SERIAL, version).recordings[0]).columns
+    (chamber,) = [each for each in document["environment"] if each["name"] == "Temperature of the chamber air"]
+    ends = float(readings["chamber_c"].min()), float(readings["chamber_c"].max())
+    assert (chamber["low"], chamber["high"]) == pytest.approx(ends, abs=1e-5)  # kept with 7 digits
+
+
+def test_a_certificate_states_the_nominal_scale_factor_and_of_which_effects_the_cause_is_not_known(
+    empty: Store,
+) -> None:
+    version = add_version(empty, certified=False)
+    said = "These data do not show that the cause is scale_factor."
+    known = Judgement("adequate", 1, AT, False, {"verdict_text": "Adequate.", "cause_not_known": [said]})
+    empty.calibrations.certify(SERIAL, version, "certify", by="Ada A.", reason="meets it", at=AT, judgement=known)
+    issue(empty, SERIAL, version, request(), AT)
+    document = json.loads(certificate_file(empty, SERIAL, version, "json").content)
+    assert f"On the error model: {said}" in document["statements"]
+    assert document["nominal"] == [{"axis": "z", "unit": "deg/s", "offset": 0.0, "scale": 1.0}]
+    dcc = certificate_file(empty, SERIAL, version, "xml").content.decode()
+    assert "Nominal axis z: scale factor 1 °/s per °/s, 0 °/s at rest." in dcc
 
 
 def test_issuing_again_answers_what_was_issued(store: Store) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
@@ -9,11 +10,16 @@ from pathlib import Path
 import pytest
 
 from labctl.answers.calibrations import FitRequest, ImproveRequest
+from labctl.answers.certification import CertificationResponse, CertifyRequest
+from labctl.calibration import read_calibration
 from labctl.errors import LabctlError
 from labctl.fitting.effects import CATALOGUE
 from labctl.recording import read_recording
-from labctl.services.calibrations.fitting import fit_unit
+from labctl.services.calibrations.assessment import assess
+from labctl.services.calibrations.certification import certify
+from labctl.services.calibrations.fitting import fit_unit, one_version
 from labctl.services.calibrations.revision import improve_unit
+from labctl.services.calibrations.served import calibration_file
 from labctl.services.criticism.criticise import criticise_unit
 from labctl.services.recordings.examples import example
 from labctl.store import Store, open_store
@@ -40,6 +46,7 @@ def test_an_adequate_version_names_what_would_explain_its_data_as_well(store: St
     assert after.undistinguished == [
         {"effect": "sine_response", "others": [name for name in before.named if name != "sine_response"]}
     ]
+    assert after.cause_not_known == [after.text[1]]
     assert after.text[1].startswith("These data do not show that the cause is sine_response")
     why = f"of {len(before.named)} effects that cannot be distinguished the one with the most evidence"
     assert any(line.startswith(f"Adding sine_response is advised, {why}: on the parts") for line in before.text)
@@ -74,6 +81,36 @@ def test_a_suspect_that_cannot_be_fitted_beside_the_model_says_why(store: Store)
             or "but the model with it cannot be fitted" in answer.why_not_named
         )
     assert all(suspect["rms_after_dps"] is None for suspect in answer.suspects if suspect["fit_refused"])
+
+
+@pytest.mark.slow
+def test_what_a_verdict_does_not_show_goes_with_the_version(store: Store) -> None:
+    (said,) = criticise_unit(store, GYRO, 2, None).cause_not_known
+    known = assess(store, GYRO, 2)
+    assert (known.objections, known.cause_not_known) == ([], [said])
+    act = certify(store, GYRO, 2, CertifyRequest(by="Ada A.", reason="meets the criteria"), AT)
+    assert isinstance(act, CertificationResponse)
+    assert act.cause_not_known == [said]
+    assert one_version(store, GYRO, 2).certification == act
+    for version in (None, 2):
+        content = calibration_file(store, GYRO, version, "json").content
+        assert json.loads(content)["certification"]["cause_not_known"] == [said]
+        certification = read_calibration(content).certification
+        assert certification is not None
+        assert certification.cause_not_known == (said,)
+    certify(store, GYRO, 1, CertifyRequest(by="Ada A.", reason="back to the simple one", override=True), AT)
+    assert "cause_not_known" not in json.loads(calibration_file(store, GYRO, None, "json").content)["certification"]
+
+
+@pytest.mark.slow
+def test_a_formula_is_said_to_name_no_cause_behind_the_verdict_and_the_warnings(store: Store) -> None:
+    formula = "bend: rate_dps * abs(rate_dps)"
+    improve_unit(store, GYRO, ImproveRequest(add=[], formula=[formula], version=2), AT)
+    answer = criticise_unit(store, GYRO, 3, None)
+    assert answer.verdict == "adequate"
+    said = "The formula bend of version 3 describes the error; it names no cause."
+    assert answer.cause_not_known == [said]
+    assert answer.text[len(answer.warnings) + 1] == said
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""Data sheets of units whose characteristics are known, beside witnesses computed from the unit itself."""
+"""Performance sheets of units whose characteristics are known, beside witnesses computed from the unit itself."""
 
 from __future__ import annotations
 
@@ -15,10 +15,13 @@ from typer.testing import CliRunner
 from labctl.answers.datasheet import Characteristic, DatasheetResponse
 from labctl.cli.app import app
 from labctl.errors import BadInput, NotFound
+from labctl.fitting import fit
+from labctl.fitting.characteristics.scale_factor import changes_with_temperature
 from labctl.fitting.data.fit_data import fit_data_of
-from labctl.recording import Recording
+from labctl.recording import Recording, read_recording
 from labctl.services.datasheet.measured import figures_of
 from labctl.services.datasheet.sheet import LINES, datasheet, decided
+from labctl.services.recordings.examples import example
 from labctl.store import Store, open_store
 from tests.helpers.recordings import STARTED, Triaxial
 from tests.helpers.service import add_recording, open_client
@@ -197,3 +200,43 @@ def test_command_line_and_http_say_the_same(tmp_path: Path, location: str, store
         found = DatasheetResponse.model_validate(client.get(f"/api/units/{serial}/datasheet").json())
     assert lines(found, "bias").keys() == lines(said, "bias").keys()
     assert lines(found, "scale_factor")["x"].value == lines(said, "scale_factor")["x"].value
+
+
+def test_temperatures_that_are_no_levels_give_the_changes_with_temperature() -> None:
+    data = fit_data_of(read_recording(example("osu-fog")))
+    assert data.levels is None
+    found = {figure.id: figure for figure in figures_of(data)}
+    bias, scale = found["bias_temperature"].estimate, found["scale_factor_temperature"].estimate
+    assert np.count_nonzero(found["bias_temperature"].rows) == len(data)
+    (fitted,) = fit(read_recording(example("osu-fog")), "bias_scale", []).to_json()["axes"].values()
+    for estimate, name, factor in ((bias, "bias_t1", 1.0), (scale, "scale_factor_t1", 1e6)):
+        coefficient = fitted["coefficients"][name]
+        assert isinstance(coefficient, dict)
+        assert isinstance(coefficient["value"], float)
+        assert estimate.u is not None
+        assert abs(estimate.value - factor * coefficient["value"]) < 3 * estimate.u, name
+
+
+def test_the_change_with_temperature_of_a_known_output_is_found() -> None:
+    rng = np.random.default_rng(4)
+    rate, warm_c = rng.uniform(-100, 100, 200), rng.uniform(20, 40, 200)
+    output = 0.1 + 0.003 * (warm_c - 30) + rate * (1.001 - 2e-5 * (warm_c - 30)) + rng.normal(0, 0.001, 200)
+    found = changes_with_temperature(rate, warm_c, output)
+    assert found is not None
+    for estimate, known in zip(found, (0.003, -2e-5), strict=True):
+        assert estimate.u is not None
+        assert abs(estimate.value - known) < 4 * estimate.u < 0.05 * abs(known)
+
+
+def test_rates_that_rise_with_the_temperature_tell_no_change() -> None:
+    rate = np.linspace(-100, 100, 200)
+    assert changes_with_temperature(rate, 30 + rate / 20, rate) is None
+    assert changes_with_temperature(rate, 30 + rate / 500, rate) is None  # 0.4 K are one temperature
+
+
+def test_each_figure_states_how_it_is_computed_and_to_what_it_is_relative(sheet: DatasheetResponse) -> None:
+    assert all(each.definition for each in sheet.characteristics)
+    for each in lines(sheet, "scale_factor").values():
+        assert each.definition.startswith("slope of the best straight line through the output over the true rate")
+        assert each.definition.endswith("(scale factor 1 deg/s per deg/s, 0 deg/s at rest)")
+    assert "differs from the coefficient of the same name where the model has further effects" in sheet.basis

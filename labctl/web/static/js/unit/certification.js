@@ -2,7 +2,7 @@
 
 import { get, post } from "../core/http/api.js";
 import { h } from "../core/elements.js";
-import { dated, instant, number, personText } from "../core/format.js";
+import { dated, instant, inWords, number, personText } from "../core/format.js";
 import { actButton, chip, factList, notice, table, toast } from "../core/components.js";
 import { dialog, WHO } from "../core/dialog.js";
 import { show, visitSignal } from "../core/router.js";
@@ -40,6 +40,23 @@ export const overridden = (act) =>
     h("p", {}, h("strong", {}, "Certified despite objections. "), `${personText(act.by)}: ${act.reason}`),
     act.objections.map((each) => h("p", { class: "small" }, each.text)),
   );
+
+/** An id of an effect in a sentence of the service. */
+const ID = /[a-z]+(?:_[a-z]+)+/g;
+
+/**
+ * What an adequate verdict does not show: which of several effects is the cause; null for nothing.
+ * @param {{ cause_not_known: readonly string[] }} known
+ */
+export const causesNotKnown = ({ cause_not_known: texts }) =>
+  texts.length
+    ? notice(
+        "warn",
+        texts.map((text) =>
+          h("p", {}, h("strong", {}, "The cause is not known. "), inWords(text, text.match(ID) ?? [])),
+        ),
+      )
+    : null;
 
 /** The longest interval between two calibrations that the service takes, days. */
 const MAX_DUE_DAYS = 36_500;
@@ -242,6 +259,7 @@ function assessed(known) {
     known.objections.some((each) => each.what === "verdict")
       ? null
       : h("p", {}, known.verdict_text || `No verdict: ${known.verdict_reason}.`),
+    causesNotKnown(known),
     known.objections.length
       ? notice(
           "bad",
@@ -262,10 +280,12 @@ function assessed(known) {
  * @returns {Fact}
  */
 const largestUncertainty = ([axis, found]) => [
-  `Largest U of ${axis} in use, k = 2`,
+  `Largest expanded uncertainty U of the corrected rate ${axis}, k = 2`,
   found.bound_dps === null ? chip("unknown", "warn") : number(found.bound_dps),
   found.bound_dps === null ? null : "deg/s",
-  found.bound_dps === null ? `any axis: ${withoutPart(found.why)}` : `any axis, up to ${number(found.reach_dps)} deg/s`,
+  `while the unit turns about any axis, at up to ${number(found.reach_dps)} deg/s${
+    found.bound_dps === null ? `: ${withoutPart(found.why)}` : ""
+  }`,
 ];
 
 /** @param {readonly Certification[]} history */
@@ -281,7 +301,10 @@ export function certificationTable(history) {
             ? "–"
             : h(
                 "span",
-                { class: "row tight", title: act.verdict_text || act.verdict_reason },
+                {
+                  class: "row tight",
+                  title: [act.verdict_text || act.verdict_reason, ...act.cause_not_known].join(" "),
+                },
                 verdictChip(act),
                 act.override ? chip("overridden", "bad") : null,
               ),

@@ -105,3 +105,18 @@ export function termsText({ axes, model, reference_temperature_c }) {
   const said = [...reference, ...parameters].join("; ");
   return said && `${said}.`;
 }
+
+/**
+ * The nominal scale factor of each output, to which the coefficients of the scale factor are relative; empty where an old
+ * answer states none.
+ * @param {Pick<Version, "output">} version
+ */
+export function nominalText({ output }) {
+  const lines = Object.entries(output).map(([axis, { unit, scale, offset }]) => {
+    const at = `${plainNumber(scale, 6)} ${unit} per deg/s`;
+    return `axis ${axis}: ${at}, ${plainNumber(offset, 6)} ${unit} at rest`;
+  });
+  return lines.length
+    ? `Nominal scale factor, to which the coefficients of the scale factor are relative: ${lines.join("; ")}.`
+    : "";
+}

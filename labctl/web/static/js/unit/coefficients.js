@@ -6,7 +6,14 @@ import { number, resultTexts, idText, withUncertainty } from "../core/format.js"
 import { shownUnit } from "../core/shown_unit.js";
 import { factList, table } from "../core/components.js";
 import { byHand } from "./by_hand.js";
-import { coefficientColumns, columnsBeside, differenceText, isSingle, termsText } from "./coefficient_table.js";
+import {
+  coefficientColumns,
+  columnsBeside,
+  differenceText,
+  isSingle,
+  nominalText,
+  termsText,
+} from "./coefficient_table.js";
 import { heldText } from "./held.js";
 
 /** @import { Coefficient, Version } from "../../../types/api.js" */
@@ -20,6 +27,8 @@ const ERRORS = [
 ];
 const FIT_ALONE =
   "The uncertainties are those of the fit alone. What the model leaves and the reference standards count in the uncertainty in use below; the command labctl uncertainty states it for each coefficient.";
+const DEFINITION =
+  "Each coefficient is that of its term in the equation of the model, and all terms are fitted together. The performance sheet below states other quantities: bias, slope of the best straight line and asymmetry of the uncorrected output (IEEE Std 528), each by itself.";
 /** Coverage factor of the bars: expanded uncertainty. */
 const K = 2;
 
@@ -62,7 +71,12 @@ export function coefficients(first, second) {
     columns.some(({ u }) => u.some((each) => each !== null)) || singles(first).some(({ u }) => u !== null);
   const note = isKnown ? h("p", { class: "muted small" }, FIT_ALONE) : null;
   const terms = termsText(first);
-  const meaning = h("p", { class: "muted small" }, terms ? `${terms} ` : null, equations(first));
+  const nominal = new Set([first, ...(second ? [second] : [])].map(nominalText).filter(Boolean));
+  const meaning = [
+    [...nominal].map((text) => h("p", {}, text)),
+    h("p", { class: "muted small" }, terms ? `${terms} ` : null, equations(first)),
+    h("p", { class: "muted small" }, DEFINITION),
+  ];
   if (columns.length) return h("div", { class: "stack" }, held, overTemperature(first, second), meaning, note);
   return h("div", { class: "stack" }, held, list(first, second), meaning, note, byHand(first));
 }

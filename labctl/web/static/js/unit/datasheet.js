@@ -1,12 +1,16 @@
-// The data sheet of a unit: measured characteristics beside specified ones, each with its recording.
+// The performance sheet of a unit: measured characteristics beside specified ones, each with its recording.
 
 import { get } from "../core/http/api.js";
 import { h } from "../core/elements.js";
 import { button, cardWithHeader, chip, loadInto, table } from "../core/components.js";
 import { number } from "../core/format.js";
+import { query, updateQuery } from "../core/router.js";
 import { unitText } from "../core/shown_unit.js";
 
 /** @import { Characteristic, Datasheet } from "../../../types/api.js" */
+
+/** What the address says of a sheet that is open, so that it stays so when the page is shown again. */
+const OPEN = "open";
 
 /**
  * A card whose sheet is computed on demand: it reads every recording of the unit.
@@ -15,12 +19,16 @@ import { unitText } from "../core/shown_unit.js";
  */
 export function datasheetCard(serial, signal) {
   const place = h("div", {});
-  const show = button("Show the data sheet", () =>
-    loadInto(place, "Data sheet", async () =>
+  const load = () =>
+    loadInto(place, "Performance sheet", async () =>
       sheet(await get("/api/units/{serial}/datasheet", { path: { serial }, signal })),
-    ),
-  );
-  return Object.assign(cardWithHeader("Data sheet", show, place), { id: "datasheet" });
+    );
+  const show = button("Show the performance sheet", () => {
+    updateQuery({ sheet: OPEN });
+    return load();
+  });
+  if (query().sheet === OPEN) load();
+  return Object.assign(cardWithHeader("Performance sheet", show, place), { id: "datasheet" });
 }
 
 /** @param {Datasheet} answer */
@@ -29,22 +37,27 @@ function sheet(answer) {
     "div",
     { class: "stack" },
     answer.text.map((text) => h("p", {}, text)),
+    h("p", {}, answer.basis),
     table(
       [
-        { title: "Characteristic", cell: (row) => row.title },
+        {
+          title: "Characteristic",
+          prose: true,
+          cell: (row) => [row.title, h("div", { class: "muted small" }, row.definition)],
+        },
         { title: "Axis", cell: (row) => (row.along ? `${row.axis} per ${row.along}` : row.axis) },
         { title: "Measured", number: true, cell: measured },
         { title: "u", number: true, cell: (row) => number(row.u, 2) },
         { title: "Unit", cell: (row) => unitText(row.unit) },
         {
-          title: "Specified",
+          title: "Maker's data sheet",
           cell: (row) => (row.specified === null ? "" : `${row.specified_as} ${number(row.specified)}`),
         },
         { title: "Decision", cell: decision },
         { title: "From", cell: source },
       ],
       answer.characteristics,
-      { label: `Data sheet of ${answer.serial}`, dense: true },
+      { label: `Performance sheet of ${answer.serial}`, dense: true },
     ),
     h("p", { class: "muted small" }, answer.decision_rule),
   );

@@ -4,7 +4,7 @@ import { h } from "../core/elements.js";
 import { day, instant, number } from "../core/format.js";
 import { factList, modelName, notice } from "../core/components.js";
 import { exportFiles } from "./export_files.js";
-import { overridden, persons, verdictChip } from "./certification.js";
+import { causesNotKnown, overridden, persons, verdictChip } from "./certification.js";
 
 /** @import { CalibrationRow, Certification, Unit } from "../../../types/api.js" */
 
@@ -51,6 +51,7 @@ export function inForce(unit, rows, force) {
       ["RMS error at temperatures left out of the fit", number(row?.heldout_rms_dps), "deg/s"],
     ]),
     force?.override ? overridden(force) : null,
+    force ? causesNotKnown(force) : null,
     left !== null && left < 0
       ? notice("bad", "The date until which this calibration is valid has passed; calibrate the unit again.")
       : null,

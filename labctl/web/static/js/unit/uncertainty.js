@@ -115,6 +115,7 @@ function aboutAnyAxis({ any_axis }) {
   const rows = Object.entries(any_axis ?? {});
   if (!rows.length) return null;
   const whys = [...new Set(rows.flatMap(([, one]) => [one.why, one.cross_rates?.why ?? ""]))].filter(Boolean);
+  const across = [...new Set(rows.flatMap(([, one]) => one.cross_rates?.about ?? []))];
   /** @param {number | null} value */
   const figure = (value) => (value === null ? unknown() : shown(value));
   return h(
@@ -124,16 +125,16 @@ function aboutAnyAxis({ any_axis }) {
     h(
       "p",
       { class: "muted small" },
-      `Largest expanded uncertainty, in deg/s, for rate vectors of any direction up to ${plainNumber(rows[0][1].reach_dps)} deg/s. The angles of the mountings count in the frame of the case; for a unit whose axes are aligned in use, only their differences count.`,
+      `The table above holds while the unit turns about the axis of one output. This one holds while it turns about any axis of its case: the largest expanded uncertainty of each corrected rate, in deg/s, over rate vectors of any direction up to ${plainNumber(rows[0][1].reach_dps)} deg/s. The angles of the mountings count in the frame of the case; for a unit whose axes are aligned in use, only their differences count.`,
     ),
     table(
       [
         { title: "Output", cell: ([axis]) => axis },
         { title: "Frame of the case", number: true, cell: ([, one]) => figure(one.bound_dps) },
         { title: "Aligned in use", number: true, cell: ([, one]) => figure(one.aligned_bound_dps) },
-        rows.some(([, one]) => one.cross_rates)
+        across.length
           ? {
-              title: "Per deg/s about axes without output",
+              title: `Per deg/s about ${joined(across)}, without an output`,
               number: true,
               cell: ([, one]) => figure(one.cross_rates?.per_dps ?? null),
             }
