@@ -1,7 +1,8 @@
 """History of a recording: temperature between and during data sets, powered runs, mountings, the range of the rate.
 
-The temperature of each powered run is resampled to an even spacing of `SPACING_S`. What an effect asks of it (slope,
-lag, hysteresis) is computed once over the whole run and interpolated at the times of the rows that ask.
+The temperature of each powered run is resampled to an even spacing of `SPACING_S`, with that of the runs before it
+where the thermometer was logged on: heat flows while the unit is off. What an effect asks of it (slope, lag,
+hysteresis) is computed once over the whole profile and interpolated at the times of the rows that ask.
 """
 
 from __future__ import annotations
@@ -24,6 +25,8 @@ LoggedColumns = Mapping[str, NDArray[np.generic]]
 CourseFunction = Callable[..., Array]
 #: Spacing of a resampled temperature profile, s.
 SPACING_S = 10.0
+#: Rows of an environment log that are no further apart are one course of the temperature, also over a power cycle, s.
+MAX_GAP_S = 60.0
 #: Windows whose middles are no further apart than this many of their lengths follow one another.
 NEXT_WINDOW = 1.2
 #: Plays of which a rounded hysteresis is made.
@@ -32,7 +35,7 @@ ROUNDED_PLAYS = 4
 
 @dataclass(frozen=True)
 class TemperatureProfile:
-    """Temperature of one powered run, evenly spaced by `SPACING_S`."""
+    """Temperature of a powered run, or of runs between which it was logged on, evenly spaced by `SPACING_S`."""
 
     begin_s: float  #: time of the first value, s
     temperature_c: Array  #: (k,) deg C
@@ -216,26 +219,59 @@ def _middle_s(columns: LoggedColumns) -> float:
 
 
 def _profiles(source: Mapping[str, Any], columns: Mapping[str, Any]) -> dict[int, TemperatureProfile]:
-    t_s = np.asarray(source["t_s"], dtype=np.float64)
-    temperature_c = np.asarray(source["temperature_c"], dtype=np.float64)
-    run_of_row = np.asarray(source["run"]) if "run" in source else np.ones(len(t_s), dtype=np.int64)
     runs = np.unique(np.asarray(columns["run"])) if "run" in columns else np.array([1])
-    profiles = {}
-    for run in runs:
-        rows = (run_of_row == run) & np.isfinite(temperature_c)
-        if "run" not in source:
-            rows = np.isfinite(temperature_c)
-        if rows.sum() < 2:
+    courses = {int(run): _course(source, int(run)) for run in runs}
+    if source is columns and "duration_s" in columns:
+        courses = {run: _with_ends(course, columns, run) for run, course in courses.items()}
+    else:
+        courses = _logged_on(courses)
+    profiles: dict[int, TemperatureProfile] = {}
+    for run, (times, values) in courses.items():
+        if len(times) < 2:
             continue
-        order = np.argsort(t_s[rows], kind="stable")
-        times, values = t_s[rows][order], temperature_c[rows][order]
-        if source is columns and "duration_s" in columns:
-            times, values = _to_the_ends(
-                times, values, np.asarray(columns["duration_s"], dtype=np.float64)[rows][order]
-            )
         grid = np.arange(times[0], times[-1] + SPACING_S, SPACING_S)
-        profiles[int(run)] = TemperatureProfile(float(grid[0]), np.interp(grid, times, values))
+        profiles[run] = TemperatureProfile(float(grid[0]), np.interp(grid, times, values))
     return profiles
+
+
+def _rows_of(source: Mapping[str, Any], run: int) -> NDArray[np.int64]:
+    """Return the rows of a run with a temperature, in order of time; without runs all rows are of each."""
+    t_s = np.asarray(source["t_s"], dtype=np.float64)
+    rows = np.isfinite(np.asarray(source["temperature_c"], dtype=np.float64))
+    if "run" in source:
+        rows &= np.asarray(source["run"]) == run
+    found = np.flatnonzero(rows)
+    return found[np.argsort(t_s[found], kind="stable")]
+
+
+def _course(source: Mapping[str, Any], run: int) -> tuple[Array, Array]:
+    """Return times, s, and temperatures, deg C, of a run, (k,) each."""
+    rows = _rows_of(source, run)
+    times, values = (np.asarray(source[name], dtype=np.float64)[rows] for name in ("t_s", "temperature_c"))
+    return times, values
+
+
+def _with_ends(course: tuple[Array, Array], columns: Mapping[str, Any], run: int) -> tuple[Array, Array]:
+    times, values = course
+    if len(times) < 2:
+        return course
+    return _to_the_ends(times, values, np.asarray(columns["duration_s"], dtype=np.float64)[_rows_of(columns, run)])
+
+
+def _logged_on(courses: Mapping[int, tuple[Array, Array]]) -> dict[int, tuple[Array, Array]]:
+    """Return the courses with those before them in front, where the log went on from the one to the next.
+
+    A follower or a hysteresis would otherwise be taken for settled at each power-on, and its way back for a warm-up.
+    """
+    joined: dict[int, tuple[Array, Array]] = {}
+    before: tuple[Array, Array] | None = None
+    for run in sorted(courses, key=lambda run: float(courses[run][0][0]) if len(courses[run][0]) else np.inf):
+        times, values = courses[run]
+        if before is not None and len(times) and 0.0 < times[0] - before[0][-1] <= MAX_GAP_S:
+            times, values = (np.concatenate(pair) for pair in zip(before, (times, values), strict=True))
+        joined[run] = (times, values)
+        before = joined[run] if len(times) else before
+    return joined
 
 
 def _to_the_ends(times: Array, values: Array, durations_s: Array) -> tuple[Array, Array]:
