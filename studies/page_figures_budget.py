@@ -73,3 +73,8 @@ def coverage_factor(freedom: float) -> float:
     density = np.exp(logs - (freedom + 1) / 2 * np.log1p(t**2 / freedom))
     inside = 2 * np.concatenate([[0.0], np.cumsum((density[1:] + density[:-1]) / 2) * (t[1] - t[0])])
     return float(np.interp(COVERAGE, inside, t))
+
+
+def leaning_rad(standards: Sequence[Mapping[str, Any]]) -> float:
+    """Return the standard uncertainty of the direction of an axis in one mounting, about one direction across it."""
+    return math.radians(math.hypot(*(u_of(each) for each in standards if each["quantity"] in ANGLES)))

@@ -234,6 +234,31 @@ def allan_deviation(values: Array, seconds: float, tau_s: Sequence[float]) -> Ar
     return np.array(found)
 
 
+def alignment_deg(slopes: Array, u: Array) -> tuple[Array, Array]:
+    """Return misalignment about x, y, z and orthogonality of xy, xz, yz, (6,) deg, by slopes (3, 3), and their u."""
+    values, step = _angles_deg(slopes), 1e-5
+    variance = np.zeros(6)
+    for place in np.ndindex(3, 3):
+        moved = np.zeros((3, 3))
+        moved[place] = step
+        change = (_angles_deg(slopes + moved) - _angles_deg(slopes - moved)) / (2 * step)
+        variance += (change * u[place]) ** 2
+    return values, np.sqrt(variance)
+
+
+def _angles_deg(slopes: Array) -> Array:
+    left, singular, right = np.linalg.svd(slopes)
+    rotation, symmetric = left @ right, (left * singular) @ left.T
+    angle = np.arccos(np.clip((np.trace(rotation) - 1) / 2, -1, 1))
+    across = np.array(
+        [rotation[1, 2] - rotation[2, 1], rotation[2, 0] - rotation[0, 2], rotation[0, 1] - rotation[1, 0]]
+    )
+    turned = across * angle / np.linalg.norm(across)  # the axes of the triad turn against what they see
+    rows = symmetric / np.linalg.norm(symmetric, axis=1, keepdims=True)
+    between = np.arccos([rows[0] @ rows[1], rows[0] @ rows[2], rows[1] @ rows[2]])
+    return np.degrees([*turned, *(np.pi / 2 - between)])
+
+
 def white_std(readings: Array) -> float:
     """Return the standard deviation of the white part of readings (n,): by the median of their periodogram.
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from studies.page_figures_budget import coverage_factor, effective_freedom, line_of, of_datasheet
+from studies.page_figures_budget import coverage_factor, effective_freedom, leaning_rad, line_of, of_datasheet
 from studies.page_figures_fit import white_var
-from studies.page_figures_formulas import asymmetry, nonlinearity, slope_over, straight_line
+from studies.page_figures_formulas import alignment_deg, asymmetry, nonlinearity, slope_over, straight_line
 from studies.page_figures_pages import BESIDE_OTHER_OUTPUTS, OF_A_MEAN, SMALL_DIFFERENCE, Compared, Row, figure, rms
 from studies.page_figures_recomputed import clock_u_of, info_of, turning_size_of
 from studies.page_figures_refit import temperature_levels
@@ -43,6 +43,7 @@ def unit_page(c: Compared) -> Iterator[Row]:
         yield figure("u of coefficients", [each["u"] for each in shown], np.sqrt(np.diag(c.law.covariance[axis])))
     yield from _uncertainty(c, answer["validity"])
     yield from _datasheet(c)
+    yield from _alignment(c)
     yield from _trend(c)
 
 
@@ -98,6 +99,26 @@ def _datasheet(c: Compared) -> Iterator[Row]:
         for name, figures in own.items():
             said = shown[name, axis][: len(figures)]
             yield figure(f"data sheet: {name.replace('_', ' ')}", said, figures, SMALL_DIFFERENCE)
+
+
+def _alignment(c: Compared) -> Iterator[Row]:
+    """Yield misalignment and orthogonality of three outputs, by their slopes over the rate about each axis."""
+    sets, level = c.sets, temperature_levels(c.sets.temperature_c)
+    if len(c.law.axes) < len("xyz") or level is None:
+        return
+    warm = np.bincount(level, sets.temperature_c) / np.bincount(level)
+    usual = level == np.argmin(np.abs(warm - 25))
+    slopes, u = np.eye(3), leaning_rad(info_of(c.database, c.recording)["standards"]) * (1 - np.eye(3))
+    for j, about in enumerate("xyz"):
+        rows = usual & np.array([up[-1] == about for up in sets.position])
+        for i, axis in enumerate("xyz"):
+            found, u_found = straight_line(sets.output_dps[axis][rows], sets.own_rate_dps[about][rows])
+            slopes[i, j], u[i, j] = found[1], np.hypot(u_found[1], u[i, j])
+    own = dict(zip(["x", "y", "z", "xy", "xz", "yz"], np.transpose(alignment_deg(slopes, u)), strict=True))
+    for each in c.get(f"/api/units/{c.serial}/datasheet")["characteristics"]:
+        if each["id"] in {"misalignment", "orthogonality"}:
+            yield figure("data sheet: misalignment and orthogonality", [each["value"], each["u"]], own[each["axis"]],
+                         SMALL_DIFFERENCE)  # fmt: skip
 
 
 def _characteristics(c: Compared, axis: str) -> dict[str, Any]:
