@@ -1,14 +1,14 @@
 """Figures of the pages of three units, and the same from the database by a script that shares no code with them.
 
 A real gyro (points), a campaign on one axis and a recording of three axes (readings). The pages show what their
-answers over HTTP say, which browser tests compare; here these answers are compared with
-`studies.page_figures_recomputed`.
+answers over HTTP say, which browser tests compare; here these answers are compared with what
+`studies.page_figures_recomputed`, `_refit`, `_formulas`, `_allan` and `_budget` compute.
 
-Taken from the answers, and so not recomputed: which readings share a bin and which data sets a cell, the size of the
-noise floor, the direction of north, and u and sensitivity of the lines of a budget beside that of the fit. Not compared
-at all: the evidence for effects and the odds, errors at what a fit left out, intervals and figures of an Allan
-deviation, U about any axis, U of a campaign that stops when it is enough, and the figures of a data sheet that no
-straight line gives.
+Taken from the answers, and so not recomputed: the drift in the noise floor (it is estimated beside a surface of many
+terms), the direction of north, the bins of the picture of an inspection, and the lines `model` and `repeatability` of a
+budget where they are not from a data sheet. Not compared at all: the evidence for effects and the odds, the test of the
+lack of fit, bounds of N, B and K and what an Allan deviation shows beside white noise, U about any axis, and U of a
+campaign that stops when it is enough.
 """
 
 from __future__ import annotations
@@ -29,7 +29,9 @@ from labctl.services.campaigns.execution import run_here
 from labctl.services.lab_service import LabService
 from labctl.store import open_store
 from studies.page_figures_explore import explore_page
-from studies.page_figures_pages import Compared, Row, campaign_page, recording_page, unit_page
+from studies.page_figures_fit import fit_of_version
+from studies.page_figures_pages import Compared, Row, campaign_page, recording_page
+from studies.page_figures_unit import unit_page
 
 RECIPES = Path(procedures.recipe.__file__).parent / "recipes"
 #: Of the campaign: enough temperatures for a parabola, and readings for an Allan deviation.
@@ -79,7 +81,7 @@ def compared(client: TestClient, database: Path, serial: str, recording: int) ->
     asked = {"recording": recording, "model": "bias_scale"}
     made = client.post(f"/api/units/{serial}/calibrations", json=asked).raise_for_status().json()
     unit = Compared.of(get, database, serial, recording, made["version"])
-    rows = [*recording_page(unit), *explore_page(unit), *unit_page(unit)]
+    rows = [*recording_page(unit), *explore_page(unit), *unit_page(unit), *fit_of_version(unit)]
     campaign = get(f"/api/recordings/{recording}")["campaign"]
     if campaign is not None:
         rows += campaign_page(unit, campaign)

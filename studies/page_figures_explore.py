@@ -7,13 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from studies.page_figures_formulas import centres, full_turns
-from studies.page_figures_pages import FIVE_DIGITS, SMALL_DIFFERENCE, Compared, Row, figure, rms
+from studies.page_figures_formulas import centres, full_turns, ranks
+from studies.page_figures_pages import FIVE_DIGITS, ROUNDING, SMALL_DIFFERENCE, Compared, Row, figure, rms
+from studies.page_figures_refit import map_cells
 
 #: Rates and temperatures of the map are means over the pieces of a data set.
 PIECES = 1e-6
 #: Errors per turn are these times as large as the errors themselves.
 TURNS = 10
+#: Where an answer has the level of the rate and of the temperature.
+LEVELS = ("rate_level_dps", "temperature_level_c")
 #: Half a unit of the eighth digit.
 EIGHT_DIGITS = 5e-8
 
@@ -69,10 +72,12 @@ def _comparison(c: Compared) -> Iterator[Row]:
     )
     modelled = [c.errors[a][0][k] - c.errors[a][1][k] for a, k in keys]
     yield figure("modelled error", columns["modelled_error_dps"], modelled, SMALL_DIFFERENCE)
-    for level, of in (("rate_level_dps", sets.table_rate_dps), ("temperature_level_c", sets.temperature_c)):
-        for a in c.law.axes:
+    for a in c.law.axes:
+        own = np.array(rows)[axis == a]
+        for level, of, cell in zip(LEVELS, (sets.table_rate_dps, sets.temperature_c), _cells(c), strict=True):
             shown = np.array(columns[level])[axis == a]
-            yield figure("levels of rate and temperature", shown, centres(of[np.array(rows)[axis == a]], shown))
+            yield figure("which data sets share a level", ranks(shown), cell[own])
+            yield figure("levels of rate and temperature", shown, centres(of[own], cell[own]), ROUNDING)
     for name, which in (("turn_before_deg", 0), ("turn_after_deg", 1)):
         own = {a: full_turns(c.errors[a][which], sets.table_rate_dps, sets.temperature_c, sets.position,
                              np.array([up[-1] == a for up in sets.position])) for a in c.law.axes}  # fmt: skip
@@ -84,6 +89,11 @@ def _comparison(c: Compared) -> Iterator[Row]:
             yield figure(
                 "lines of the model", lines["error_dps"], _line(c, lines, rate.ravel(), warm.ravel()), EIGHT_DIGITS
             )
+
+
+def _cells(c: Compared) -> tuple[Any, Any]:
+    """Return column and row, (n,) each, of the data sets in a map of rate and temperature."""
+    return map_cells(c.sets.table_rate_dps, c.sets.temperature_c, c.sets.position)
 
 
 def _line(c: Compared, lines: Any, rate_dps: Any, temperature_c: Any) -> Any:
@@ -107,9 +117,11 @@ def _maps(c: Compared, maps: Any, fitted: Any) -> Iterator[Row]:
         floors += [r / o for r, o in zip(part["residual_dps"], part["over_floor"], strict=True) if o]
     for axis in {part["axis"] for part in maps}:
         own = [part for part in maps if part["axis"] == axis]
-        for level, of in (("rate_level_dps", "table_rate_dps"), ("temperature_level_c", "temperature_c")):
+        rows = [place[n] for part in own for n in part["dataset"]]
+        for level, of, cell in zip(LEVELS, ("table_rate_dps", "temperature_c"), _cells(c), strict=True):
             shown, values = (np.concatenate([part[name] for part in own]) for name in (level, of))
-            yield figure("levels of the map", shown, centres(values, shown))
+            yield figure("which data sets share a cell of the map", ranks(shown), cell[rows])
+            yield figure("levels of the map", shown, centres(values, cell[rows]), ROUNDING)
     if floors:
         yield figure("noise floor of a mean, from the map", [floor], [rms(np.array(floors))], SMALL_DIFFERENCE)
 

@@ -14,17 +14,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from studies.page_figures_allan import freedom_of_white, interval, terms
 from studies.page_figures_formulas import (
     Law,
     allan_deviation,
-    asymmetry,
+    bins_of_trace,
     in_bins,
-    nonlinearity,
-    straight_line,
     waves,
     without_waves,
 )
-from studies.page_figures_recomputed import Sets, clock_u_of, environment_of, law_of, residuals_of, sets_of, steps_of
+from studies.page_figures_recomputed import Sets, environment_of, law_of, residuals_of, sets_of, steps_of
 
 #: Sums in another order.
 ROUNDING = 1e-12
@@ -34,13 +33,12 @@ SMALL_DIFFERENCE = 1e-7
 OF_A_MEAN = 1e-5
 #: Half a unit of the fifth digit; envelopes of readings are kept with 24 bits.
 FIVE_DIGITS, SINGLE_PRECISION = 5e-5, 6e-8
+#: The terms of an Allan variance are fitted in steps, which end where they change no digit of the figures shown.
+OF_THE_FIT = 1e-6
 #: The errors of the outputs of a triad are correlated, which is not written here.
 BESIDE_OTHER_OUTPUTS = 1e-3
 #: Columns of the trace that is compared: fewer than the readings, so that bins have several.
 POINTS = 1200
-
-#: Figures of the data sheet that a straight line through the output over the rate gives.
-STRAIGHT_LINE = ("bias", "scale_factor", "scale_factor_asymmetry", "scale_factor_nonlinearity")
 
 Get = Callable[..., Any]
 
@@ -155,22 +153,25 @@ def _readings(c: Compared, path: str) -> Iterator[Row]:
                  [sets.raw[name][sets.begins[-2] :] for name in names])  # fmt: skip
     begin, end = sets.from_s[-1], sets.until_s[-1]
     window = f"&from_s={begin - 1}&until_s={end + 1}"
-    for words, asked, of in (
-        ("over all", "", slice(None)),
-        ("within a data set", window, slice(sets.begins[-2], None)),
+    times_s = sets.raw["t_s"]
+    for words, asked, of, limits_s in (
+        ("over all", "", slice(None), (sets.from_s.min(), sets.until_s.max())),
+        ("within a data set", window, slice(sets.begins[-2], None), (begin - 1, end + 1)),
     ):
+        bins = bins_of_trace(times_s, sets.begins, limits_s, POINTS)
         for channel in (name for name in sets.raw if name.startswith(("gyro_", "temperature_c"))):
             shown = c.get(f"{path}/trace?channel={channel}&points={POINTS}{asked}")
-            own = in_bins(sets.raw[channel][of], shown["n"])
+            yield figure("which readings share a bin", shown["n"], bins)
+            own = in_bins(sets.raw[channel][of], bins)
             yield figure(f"trace {words}", [shown[name] for name in own], list(own.values()), SINGLE_PRECISION)
-            times = in_bins(sets.raw["t_s"][of], shown["n"])["mean"]
+            times = in_bins(times_s[of], bins)["mean"]
             yield figure(f"time of a trace {words}", shown["t_s"], times, SINGLE_PRECISION)
     for course in c.get(f"{path}/inspection")["courses"]:
-        bins = [each for each in zip(course["t_s"], course["low"], course["high"], strict=True) if each[0] is not None]
+        drawn = [each for each in zip(course["t_s"], course["low"], course["high"], strict=True) if each[0] is not None]
         # a bin has the time of its first reading
-        begins = np.searchsorted(sets.raw["t_s"], [t_s for t_s, _, _ in bins])
+        begins = np.searchsorted(sets.raw["t_s"], [t_s for t_s, _, _ in drawn])
         limits = [(part.min(), part.max()) for part in np.split(sets.raw[course["channel"]], begins[1:])]
-        yield figure("picture of the inspection", [pair for _, *pair in bins], limits, SINGLE_PRECISION)
+        yield figure("picture of the inspection", [pair for _, *pair in drawn], limits, SINGLE_PRECISION)
 
 
 def _allan(c: Compared, path: str) -> Iterator[Row]:
@@ -183,91 +184,21 @@ def _allan(c: Compared, path: str) -> Iterator[Row]:
     rows = slice(sets.begins[k], sets.begins[k + 1])
     seconds = float(np.median(np.diff(sets.raw["t_s"][rows])))
     for axis, shown in c.get(f"{path}/allan?dataset={sets.number[k]}")["axes"].items():
-        own = allan_deviation(sets.raw[f"gyro_{axis}"][rows], seconds, shown["tau_s"])
+        readings, tau_s = sets.raw[f"gyro_{axis}"][rows], np.array(shown["tau_s"])
+        own = allan_deviation(readings, seconds, shown["tau_s"])
+        m = np.round(tau_s / seconds)
         yield figure("Allan deviation", shown["deviation_dps"], own, FIVE_DIGITS)
-
-
-def unit_page(c: Compared) -> Iterator[Row]:
-    """Yield the figures of the page of a unit: versions, coefficients, uncertainty in use, the error over the years."""
-    answer, fitted = c.get(c.path), c.fitted_dps
-    raw = rms(*(each[0] for each in c.errors.values()))
-    rows = c.get(f"/api/units/{c.serial}/calibrations")
-    (step,) = (each for each in c.get(f"/api/units/{c.serial}/ladder")["steps"] if each["version"] == c.version)
-    (row,) = (each for each in rows if each["version"] == c.version)
-    yield figure(
-        "RMS error without a correction",
-        [answer["error"]["raw_rms_dps"], step["raw_rms_dps"]],
-        [raw, raw],
-        SMALL_DIFFERENCE,
-    )
-    yield figure("RMS error of a version", [answer["error"]["rms_dps"], step["rms_dps"], row["rms_dps"]],
-                 [rms(*fitted.values())] * 3, SMALL_DIFFERENCE)  # fmt: skip
-    for axis, own in answer["axes"].items():
-        names = c.law.names[axis]
-        shown = [own["coefficients"][name] for name in names]
-        yield figure(
-            "coefficients", [each["value"] for each in shown], [c.law.coefficients[axis][name] for name in names], 0.0
-        )
-        yield figure("u of coefficients", [each["u"] for each in shown], np.sqrt(np.diag(c.law.covariance[axis])))
-    yield from _uncertainty(c, answer["validity"])
-    yield from _datasheet(c)
-    yield from _trend(c)
-
-
-def _uncertainty(c: Compared, validity: Any) -> Iterator[Row]:
-    """Yield the contributions in use at a rate: that of the fit by its covariance, and how all are combined."""
-    rate, warm = 0.5 * max(validity["rate_dps"]), float(np.mean(validity["temperature_c"]))
-    answer = c.get(f"{c.path}/uncertainty?rate_dps={rate}&temperature_c={warm}")
-    for axis, one in answer["axes"].items():
-        own = [c.law.u_of_fit(axis, rate, warm)]
-        yield figure("u of the coefficients in use", [one["coefficients_dps"]], own, BESIDE_OTHER_OUTPUTS)
-        budget = answer["budget"][axis]
-        first_order = [line for line in budget["lines"] if line["u"] is not None and line["sensitivity"]]
-        yield figure("contributions in use", [line["contribution"] for line in first_order],
-                     [abs(line["u"] * line["sensitivity"]) for line in first_order])  # fmt: skip
-        if budget["combined"] is not None:
-            combined = float(np.sqrt(sum(line["contribution"] ** 2 for line in budget["lines"])))
-            k = answer["coverage_factor"]
-            shown = [budget["combined"], budget["expanded"], k * one["combined_dps"]]
-            yield figure("combined and expanded uncertainty", shown,
-                         [combined, budget["k"] * combined, budget["k"] * combined])  # fmt: skip
-
-
-def _datasheet(c: Compared) -> Iterator[Row]:
-    """Yield the figures of the data sheet that a straight line through the output over the rate gives."""
-    sets, clock_u = c.sets, clock_u_of(c.database, c.recording)
-    for shown in c.get(f"/api/units/{c.serial}/datasheet")["characteristics"]:
-        name, axis = shown["id"], shown["axis"]
-        if shown["value"] is None or name not in STRAIGHT_LINE:
-            continue
-        low, high = shown["conditions"]["temperature_c"]
-        rows = np.array([up[-1] == axis for up in sets.position])
-        rows &= (sets.temperature_c >= low - 1e-9) & (sets.temperature_c <= high + 1e-9)
-        rate, output = sets.own_rate_dps[axis][rows], sets.output_dps[axis][rows]
-        (bias, slope), (u_bias, u_slope) = straight_line(output, rate)
-        own = {
-            "bias": [bias, u_bias],
-            "scale_factor": [slope, np.hypot(u_slope, clock_u * slope)],
-            "scale_factor_asymmetry": asymmetry(output, rate),
-            "scale_factor_nonlinearity": [nonlinearity(output, rate, float(np.abs(rate).max()))],
-        }[name]
-        said = [shown["value"], shown["u"]][: len(own)]
-        yield figure(f"data sheet: {name.replace('_', ' ')}", said, own, SMALL_DIFFERENCE)
-
-
-def _trend(c: Compared) -> Iterator[Row]:
-    """Yield the bias and scale factor that a version leaves, where the unit has a trend."""
-    for point in c.get(f"/api/units/{c.serial}/trend")["points"]:
-        for axis, shown in point["axes"].items():
-            found, u = straight_line(c.residual_dps[axis], c.sets.own_rate_dps[axis])
-            names = [(shown[k], own) for k, own in zip(("u_bias_dps", "u_scale_factor"), u, strict=True)]
-            yield figure("bias left by a version", [shown["bias_dps"]], [found[0]], OF_A_MEAN)
-            yield figure(
-                "u of bias and scale factor left",
-                [each[0] for each in names],
-                [each[1] for each in names],
-                SMALL_DIFFERENCE,
-            )
+        yield figure("interval of an Allan deviation", [shown["low_dps"], shown["high_dps"]],
+                     interval(own, freedom_of_white(len(readings), m)), FIVE_DIGITS)  # fmt: skip
+        model, n, u = terms(own**2, tau_s, m, len(readings))
+        yield figure("fitted curve of an Allan deviation", shown["model_dps"], model, FIVE_DIGITS)
+        yield figure("angle random walk and its u, deg/sqrt(h)", [shown["N"]["value"], shown["N"]["u"]],
+                     [60 * n, 60 * u], OF_THE_FIT)  # fmt: skip
+        (sheet,) = (
+            each for each in c.get(f"/api/units/{c.serial}/datasheet")["characteristics"]
+            if each["id"] == "angle_random_walk" and each["axis"] == axis
+        )  # fmt: skip
+        yield figure("data sheet: angle random walk", [sheet["value"], sheet["u"]], [n, u], OF_THE_FIT)
 
 
 def campaign_page(c: Compared, campaign: int) -> Iterator[Row]:

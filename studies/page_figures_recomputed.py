@@ -129,10 +129,28 @@ def _valid(by_set: list[dict[str, Array]], channels: list[dict[str, Any]]) -> tu
 
 def clock_u_of(database: Path, recording: int) -> float:
     """Return the relative standard uncertainty of the clock that sets the rates, which it states in ppm; 0: none is."""
+    clocks = [each for each in info_of(database, recording)["standards"] if each["quantity"] == "clock"]
+    return sum(1e-6 * each["expanded"] / each["k"] for each in clocks)
+
+
+def info_of(database: Path, recording: int) -> dict[str, Any]:
+    """Return what a recording states of unit and bench."""
     with sqlite3.connect(database) as file:
         (info,) = file.execute("select info from recordings where id = ?", (recording,)).fetchone()
-    clocks = [each for each in json.loads(info)["standards"] if each["quantity"] == "clock"]
-    return sum(1e-6 * each["expanded"] / each["k"] for each in clocks)
+    return dict(json.loads(info))
+
+
+def stability_of(database: Path, recording: int) -> float | None:
+    """Return the bias stability of the data sheet as a standard deviation, deg/s; None: none is stated as one."""
+    info = info_of(database, recording)
+    stated = info["datasheet"].get("bias_stability_dps")
+    assert stated is None or info["datasheet_conventions"]["bias_stability_dps"] == "1 sigma"
+    return None if stated is None else float(stated)
+
+
+def turning_size_of(database: Path, recording: int) -> float:
+    """Return the size of the Earth's rate that goes round with the table, deg/s."""
+    return float(EARTH_DPS * np.cos(np.radians(info_of(database, recording)["latitude_deg"])))
 
 
 def environment_of(database: Path, recording: int) -> dict[str, Array]:

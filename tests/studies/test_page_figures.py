@@ -26,12 +26,15 @@ KINDS = {
         "data sets, readings", "number, rate and readings of data sets", "mean of a data set",
         "standard deviation of a data set", "begin and end of a data set", "readings of a data set", "trace over all",
         "time of a trace over all", "trace within a data set", "time of a trace within a data set",
-        "picture of the inspection", "Allan deviation",
+        "picture of the inspection", "Allan deviation", "which readings share a bin", "interval of an Allan deviation",
+        "fitted curve of an Allan deviation", "angle random walk and its u, deg/sqrt(h)",
     },
     "explore": {
         "rate and temperature of a point", "measured error", "residual without refitting", "modelled error",
+        "which data sets share a level",
         "levels of rate and temperature", "error of a full turn", "lines of the model", "Earth's rate once per turn",
-        "residual map", "rates and temperatures of the map", "levels of the map", "noise floor of a mean, from the map",
+        "residual map", "rates and temperatures of the map", "which data sets share a cell of the map",
+        "levels of the map", "noise floor of a mean, from the map",
         "residual against channels", "channels of the residual", "RMS residual of the fitted model",
         "RMS where the error is largest", "RMS, largest and mean error of a version", "data sets furthest off",
     },
@@ -39,7 +42,17 @@ KINDS = {
         "RMS error without a correction", "RMS error of a version", "coefficients", "u of coefficients",
         "u of the coefficients in use", "contributions in use", "combined and expanded uncertainty",
         "bias left by a version", "u of bias and scale factor left", "data sheet: bias", "data sheet: scale factor",
-        "data sheet: scale factor asymmetry", "data sheet: scale factor nonlinearity",
+        "data sheet: scale factor asymmetry", "data sheet: scale factor nonlinearity", "data sheet: bias temperature",
+        "data sheet: scale factor temperature", "data sheet: angle random walk",
+        "data sheet: misalignment and orthogonality", "u of a reference standard",
+        "sensitivity of a reference standard", "contribution of a reference standard",
+        "repeatability by the data sheet",
+        "effective degrees of freedom", "coverage factor", "scale factor left by a version, over its u",
+    },
+    "fit": {
+        "coefficients by a refit, of their u", "u of coefficients by a refit, over another",
+        "RMS error at temperatures left out", "white noise of a mean", "noise floor, with the drift that is stated",
+        "noise floor by near repeats",
     },
     "campaign": {
         "samples of the course", "course of a campaign", "begin and end of a step", "channels of a campaign",
@@ -47,9 +60,13 @@ KINDS = {
 }  # fmt: skip
 #: What recomputes the figures may import these modules and each other.
 ALONE = {
-    "__future__", "blosc2", "collections.abc", "dataclasses", "itertools", "json", "numpy", "pathlib", "sqlite3",
-    "struct", "studies.page_figures_formulas", "typing",
+    "__future__", "blosc2", "collections.abc", "dataclasses", "functools", "itertools", "json", "math", "numpy",
+    "pathlib", "sqlite3", "struct", "typing",
 }  # fmt: skip
+#: What recomputes the figures.
+RECOMPUTING = {f"page_figures_{each}" for each in ("allan", "budget", "formulas", "recomputed", "refit")}
+#: Figures of a method that the documentation does not state to the last digit have this many.
+BY_METHOD = {"noise floor by near repeats": 5e-3}
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +80,7 @@ def test_figures_of_three_units_are_those_of_the_database(compared: dict[str, li
     for unit, rows in compared.items():
         for row in rows:
             assert row.n > 0, f"{unit}: {row.figure}"
-            assert row.worst <= row.allowed <= LEAST_DIGITS, f"{unit}: {row.figure}"
+            assert row.worst <= row.allowed <= BY_METHOD.get(row.figure, LEAST_DIGITS), f"{unit}: {row.figure}"
     assert sum(row.n for rows in compared.values() for row in rows) > 40_000
 
 
@@ -81,12 +98,12 @@ def test_a_figure_that_is_wrong_or_missing_is_noticed() -> None:
             figure("a", shown, [1.0, 2.0])
 
 
-@pytest.mark.parametrize("module", ["page_figures_recomputed", "page_figures_formulas"])
+@pytest.mark.parametrize("module", sorted(RECOMPUTING))
 def test_what_is_recomputed_shares_no_code_with_the_pages(module: str) -> None:
     tree = ast.parse(Path(f"studies/{module}.py").read_text(encoding="utf-8"))
     imported = {each.name for node in ast.walk(tree) if isinstance(node, ast.Import) for each in node.names}
     imported |= {node.module or "" for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
-    assert imported <= ALONE
+    assert imported <= ALONE | {f"studies.{each}" for each in RECOMPUTING}
 
 
 @pytest.mark.slow

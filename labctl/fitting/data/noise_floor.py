@@ -28,6 +28,8 @@ from labctl.fitting.numeric.least_squares import drift_beside
 REPEAT_RATE = 1e-3
 REPEAT_TEMPERATURE_C = SAME_TEMPERATURE_C
 REPEATS_NEEDED = 8
+#: Of fewer data sets than this the drift is that of the data sheet, if it states one.
+MIN_SETS = 16
 #: Probability at which noise alone is taken for a law that no smooth function of temperature follows.
 FALSE_ALARM = 1e-4
 
@@ -83,8 +85,10 @@ def _with_known_white(
     errors_dps: Mapping[str, Array],
     scatter: Mapping[str, Scatter],
 ) -> NoiseFloor:
-    enough = all(len(surface) - surface.shape[1] >= MIN_FREE for surface in surfaces.values())
     stability = next(iter(scatter.values())).datasheet_drift_dps
+    # beside fewer data sets the surface has too few columns for the laws of a gyro, which would pass for drift
+    least = MIN_SETS if stability else MIN_FREE
+    enough = all(len(surface) >= least and len(surface) - surface.shape[1] >= MIN_FREE for surface in surfaces.values())
     axes = {}
     for axis, surface in surfaces.items():
         noise = scatter[axis]

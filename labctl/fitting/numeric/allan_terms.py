@@ -29,8 +29,8 @@ TOLERANCE = 0.02
 SMOOTHED_SHARE = 0.4
 #: Octaves that a fit needs.
 MIN_OCTAVES = 5
-#: A model of the variances has converged when none changes by more than this share and this amount, (deg/s)^2.
-CONVERGED, CONVERGED_VAR = 1e-8, 1e-8
+#: A model of the variances has converged when none changes by more than this share.
+CONVERGED = 1e-6
 DEG_PER_ROOT_HOUR = 60.0
 DEG_PER_HOUR = 3600.0
 
@@ -177,7 +177,7 @@ def _fit(design: NDArray[np.float64], variance: Array, freedom: Array, terms_kep
         before = model
         model = np.maximum(design[:, terms_kept] @ (coefficients / size), 1e-12 * variance)
         terms[terms_kept] = coefficients / size
-        if np.all(np.abs(model - before) <= CONVERGED_VAR + CONVERGED * before):
+        if np.all(np.abs(model - before) <= CONVERGED * before):
             break
     ratio = variance / model
     return terms, float(np.sum(freedom * (ratio - np.log(ratio) - 1.0)))

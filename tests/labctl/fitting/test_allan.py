@@ -195,3 +195,18 @@ def test_criticism_weighs_with_the_static_record() -> None:
     smallest = min(noise.size_dps for noise in found.comparison.axes["z"].noises)
     assert smallest > 1e-4  # around 1.35 B, not around half of the data sheet's 1e-5
     assert reduce_recording(recording).static is None
+
+
+def test_figures_are_in_proportion_to_the_noise() -> None:
+    """The fit of the terms once ended at a change of 1e-8 (deg/s)^2, which is all of the noise of a good gyro."""
+    rng = np.random.default_rng(1)
+    record = rng.normal(0, 0.01, 36_000) + 1e-5 * np.cumsum(rng.normal(size=36_000))
+    found = []
+    for size in (1.0, 1e-3):
+        answer = allan(size * record, 0.1)
+        assert answer is not None
+        figure = answer.figures["N"]
+        assert figure.value is not None
+        assert figure.u is not None
+        found.append([figure.value / size, figure.u / size])
+    assert found[1] == pytest.approx(found[0], rel=1e-6)
