@@ -193,9 +193,7 @@ def test_a_plan_for_a_unit_without_a_bench_says_that_another_unit_is_simulated(
     try:
         page = chromium.new_page()
         page.goto(f"{serving.url}/campaigns/new?recipe=short&unit=OSU-FOG-2024")
-        expect(
-            page.get_by_text("This experiment is for OSU-FOG-2024, and this service drives no bench.")
-        ).to_be_visible()
+        expect(page.get_by_text("This experiment is for OSU-FOG-2024. This service drives no bench.")).to_be_visible()
         page.get_by_role("button", name="Simulate the recording").click()
         page.wait_for_url("**/explore?**recording=1**")
         (made,) = serving.get("/api/recordings")

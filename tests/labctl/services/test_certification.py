@@ -143,7 +143,8 @@ def criticism(verdict: str, share_removed: float) -> CriticismResponse:
         "effect": "saturation", "probability": 0.5, "p_value": 0.5, "log_bayes_factor": 1.0,
         "share_removed": share_removed, "coefficients": {}, "coefficients_from": "comparison", "parameters": {},
         "physical": True, "plausible": None, "rms_after_dps": None, "heldout_rms_after_dps": None,
-        "alias_group": ["saturation"], "origin": "sensor", "explanation": "", "experiment": "",
+        "usual_size": None, "fit_refused": None, "alias_group": ["saturation"], "origin": "sensor",
+        "explanation": "", "experiment": "",
     }  # fmt: skip
     error = {"rms_dps": 0.05, "heldout_rms_dps": None, "noise_floor_dps": 0.01, "noise_floor_source": "none"}
     noise = dict.fromkeys(("white_dps", "drift_dps", "drift_tau_s", "vs_datasheet", "static"))
