@@ -184,7 +184,11 @@ def test_suspects_beside_an_adequate_model_say_why_none_is_named_and_what_the_no
     expect(verdict).not_to_contain_text(said)  # stands beside the odds, once
     expect(verdict).not_to_contain_text("nothing is missing")
     expect(verdict).to_contain_text("by data sets that repeat each other")
-    expect(verdict).to_contain_text("The noise floor is that of the recording, the same for every model.")
+    ratio = answer["error"]["rms_dps"] / answer["error"]["noise_floor_dps"]
+    expect(verdict).to_contain_text(
+        f"the same for every model: {ratio:.2g} floors are {ratio**2:.2g} times its variance. The ratio "
+        f"{answer['lack_of_fit']['statistic']:.2g} compares each data set with its own noise"
+    )
 
 
 @pytest.mark.slow
