@@ -479,6 +479,7 @@ from labctl.answers.units import (
     AxisPoint as AxisPoint,
     BatchRequest as BatchRequest,
     BatchResponse as BatchResponse,
+    CalibrationEventResponse as CalibrationEventResponse,
     Drift as Drift,
     DriftLine as DriftLine,
     ExportFormatResponse as ExportFormatResponse,

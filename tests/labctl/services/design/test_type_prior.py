@@ -81,7 +81,7 @@ def test_a_fit_with_the_prior_of_its_type_is_more_certain_and_says_where_it_is_f
     again = prior_of_type(store, "FOG-A", "bias_scale", [])
     assert again.prior.units == MIN_UNITS  # a version that was fitted with a prior is no evidence for the next one
     assert again.versions_hash == stated["versions_hash"]
-    facts = SimpleNamespace(simulated=False, calibration=SimpleNamespace(document=document))
+    facts = SimpleNamespace(simulated=False, calibration=SimpleNamespace(document=document), authorised=None)
     (said,) = [text for text in statements(cast(Facts, facts)) if "of type FOG-A" in text]
     assert f"together with the calibrations of {MIN_UNITS} other units" in said
     print_fit(answer)
