@@ -145,6 +145,14 @@ def _characteristics(c: Compared, axis: str) -> dict[str, Any]:
     if len(warm) > 1:
         own["bias_temperature"] = slope_over(warm, values[:, 0], u[:, 0])
         own["scale_factor_temperature"] = np.array(slope_over(warm, values[:, 1], u[:, 1])) * 1e6 / slope
+    elif np.ptp(sets.temperature_c) >= 1.0:  # temperatures that are no levels: one line that changes with them
+        warmer = sets.temperature_c[about] - sets.temperature_c[about].mean()
+        rates = sets.own_rate_dps[axis][about]
+        columns = np.column_stack([np.ones(len(rates)), rates, warmer, rates * warmer])
+        fitted, left, *_ = np.linalg.lstsq(columns, sets.output_dps[axis][about], rcond=None)
+        u_of = np.sqrt(np.diag(np.linalg.inv(columns.T @ columns)) * left[0] / (len(rates) - 4))
+        own["bias_temperature"] = [fitted[2], u_of[2]]
+        own["scale_factor_temperature"] = np.array([fitted[3], u_of[3]]) * 1e6 / slope
     return own
 
 

@@ -260,7 +260,7 @@ def test_a_designed_recipe_is_the_services_and_its_plan_is_shown(service: Servic
     expected = service.post("/api/designs", {"like": "short", "u_dps": 0.02})
     expect(card.get_by_role("button", name="Take this recipe")).to_be_visible()
     for sentence in expected["decisions"]:
-        expect(card).to_contain_text(sentence)
+        expect(card).to_contain_text(on_page(sentence))
     rows = [expected["chosen"], *expected["others"], *filter(None, [expected["reference"]])]
     drawn = figure(page, "Hours and uncertainty of the recipes")["data"][0]
     assert drawn["x"] == pytest.approx([row["hours"] for row in rows])

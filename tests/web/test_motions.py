@@ -68,7 +68,7 @@ def test_at_rest_both_legs_are_drawn_and_the_map_is_not(service: Service, visit:
     explained = named(figure(page, "Residual against a channel"))["explained"]
     assert np.std(explained["y"]) > 0.5 * np.std(drawn["data"][0]["y"])  # the lag is nearly all of the residual
     unit = visit("/units/REST-1")
-    legs = unit.get_by_role("group", name="Held out by leg")
+    legs = unit.get_by_role("group", name="Left out by leg")
     expect(legs.get_by_role("row")).to_have_count(4)
 
 
