@@ -7,7 +7,7 @@ import { channelName } from "../recordings/channels.js";
 
 /** @import { Visibility } from "../../../types/api.js" */
 
-/** Below this share left beside the usual model, the model absorbs the effect. */
+/** Below this share left beside the model of a first fit, that model absorbs the effect. */
 const ABSORBED_SHARE = 0.02;
 
 /** @param {{ effect: string }} row */
@@ -54,7 +54,7 @@ export function visibilityReport(rows) {
       seen.map((row) =>
         h(
           "li",
-          { title: `${percent(row.share)} of it is not absorbed by the usual model` },
+          { title: `${percent(row.share)} of it is not absorbed by the model of a first fit` },
           effectLink(row),
           h("span", { class: "nowrap" }, smallestSize(row)),
         ),
@@ -81,7 +81,7 @@ export function visibilityReport(rows) {
           unseen,
           { label: "Effects this plan cannot detect" },
         )
-      : notice("good", "This plan can detect every effect that is not part of the usual model."),
+      : notice("good", "This plan can detect every effect that is not part of the model of a first fit."),
     fitted.length
       ? h(
           "p",

@@ -224,7 +224,7 @@ export function cellPlaces(maps) {
 export function residualMap(name, caption, give, { onselect, height = "22rem" } = {}) {
   /** @type {Place | null} */
   let cursor = null;
-  /** @type {(PlacedCell & { panel: number })[]} */
+  /** @type {(PlacedCell & { panel: number, axes: string })[]} */
   let drawn = [];
   const draw = () => {
     drawn = [];
@@ -254,7 +254,7 @@ export function residualMap(name, caption, give, { onselect, height = "22rem" } 
     const data = maps.flatMap((map, k) => {
       const id = k ? String(k + 1) : "";
       const { data: traces, placed, x, y, text } = positionPanel(map, id, pick, cursor?.panel === k ? cursor : null);
-      drawn.push(...placed.map((cell) => ({ ...cell, panel: k })));
+      drawn.push(...placed.map((cell) => ({ ...cell, panel: k, axes: id })));
       layout[`xaxis${id}`] = below && k < maps.length - 1 ? { ...x, title: undefined } : x; // one title for all panels
       layout[`yaxis${id}`] = y;
       layout.annotations.push({
@@ -276,12 +276,11 @@ export function residualMap(name, caption, give, { onselect, height = "22rem" } 
   const { redraw } = element;
   const outlines = () => {
     const { pick = new Set() } = give();
-    return drawn.flatMap(({ panel, at: [x, y], ...cell }) => {
+    return drawn.flatMap(({ panel, axes, at: [x, y], ...cell }) => {
       const squares = [
         isPicked(cell, pick) ? PICKED : null,
         cursor?.panel === panel && isUnder(cell, cursor) ? CURSOR : null,
       ];
-      const axes = panel ? String(panel + 1) : "";
       return squares.flatMap((square) => (square ? [{ ...square, color: colour(square.color), axes, x, y }] : []));
     });
   };
