@@ -51,7 +51,7 @@ def test_recordings_are_chosen_fitted_and_drawn_together(unit: Service, visit: C
     said = unit.get(f"{UNIT}/calibrations/2/criticism?recordings=1&recordings=2&recordings=3")["joint"]
     for line in said["text"]:
         expect(joint.get_by_text(on_page(line))).to_be_visible()
-    expect(joint.get_by_role("group", name="Held-out recordings").get_by_role("row")).to_have_count(4)
+    expect(joint.get_by_role("group", name="Recordings left out of the fit").get_by_role("row")).to_have_count(4)
     expect(joint.get_by_role("group", name="Agreement").get_by_role("row")).to_have_count(1 + len(said["agreement"]))
     (turn_on, _) = said["repeatability"]["z"]
     shifts = trace_of(figure(page, f"Shifts: {turn_on['term']}"), "axis z")

@@ -83,7 +83,9 @@ def test_a_wrong_file_is_refused_with_the_place_of_the_fault(
 
 
 @pytest.mark.slow
-def test_two_people_at_once_make_two_versions(fog: Service, visit: Callable[..., Page]) -> None:
+def test_the_second_of_two_people_is_told_and_makes_another_version(
+    fog: Service, visit: Callable[..., Page], faults: Faults
+) -> None:
     from playwright.sync_api import expect
 
     pages = [visit("/explore?unit=OSU-FOG-2024&version=1") for _ in range(2)]
@@ -92,11 +94,23 @@ def test_two_people_at_once_make_two_versions(fog: Service, visit: Callable[...,
         page.get_by_label("Add an effect").select_option(effect)
         page.get_by_role("button", name="Preview").click()
         page.get_by_role("button", name="Make version 2").wait_for()
-    for page in pages:
-        page.get_by_role("button", name="Make version 2").click()
-        expect(page.get_by_role("region", name="Error of the versions")).to_contain_text("Version 1: residual before")
-    steps = fog.get("/api/units/OSU-FOG-2024/ladder")["steps"]
-    assert [(step["version"], step["parent"]) for step in steps] == [(1, None), (2, 1), (3, 1)]
+    first, second = pages
+    first.get_by_role("button", name="Make version 2").click()
+    expect(first.get_by_role("region", name="Error of the versions")).to_contain_text("Version 1: residual before")
+    second.get_by_role("button", name="Make version 2").click()
+    told = second.get_by_role("dialog", name="Version 2 of OSU-FOG-2024 exists already")
+    expect(told.get_by_role("link", name="Explore version 2")).to_be_visible()
+    assert versions(fog) == [(1, None), (2, 1)]
+    faults.clear()  # the browser complains of the answer 409
+    told.get_by_role("button", name="Make another version").click()
+    expect(second.get_by_role("region", name="Error of the versions")).to_contain_text("Version 1: residual before")
+    assert versions(fog) == [(1, None), (2, 1), (3, 1)]
+
+
+def versions(service: Service) -> list[tuple[int, int | None]]:
+    """Return each version's number and the number of the one that it was made from."""
+    steps = service.get("/api/units/OSU-FOG-2024/ladder")["steps"]
+    return [(step["version"], step["parent"]) for step in steps]
 
 
 @pytest.fixture
