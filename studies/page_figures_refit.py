@@ -182,11 +182,10 @@ def weighted(columns: Array, values: Array, means: Means, drift: Drift, modes: M
     total = 1.0 + drift.size_dps**2 * modes.drift_var
     size = np.linalg.norm(columns, axis=0)
     rows = modes.directions @ np.column_stack([columns / size, values]) / np.sqrt(total)[:, None]
-    # a once-per-turn amplitude is 0 with its known variance: one more row, which has the drift of a power-on of its own
+    # a once-per-turn amplitude is 0 with its known variance: one more row, in which there is no drift
     turning = _turning(columns, means)
-    known_var = means.turning_var + drift.size_dps**2
     known = np.zeros((len(turning), rows.shape[1]))
-    known[np.arange(len(turning)), turning] = 1 / (size[turning] * np.sqrt(known_var)) if len(turning) else 0.0
+    known[np.arange(len(turning)), turning] = 1 / (size[turning] * np.sqrt(means.turning_var)) if len(turning) else 0.0
     rows = np.vstack([rows, known])
     q, r = np.linalg.qr(rows[:, :-1])
     beta = np.linalg.solve(r, q.T @ rows[:, -1])
@@ -194,7 +193,6 @@ def weighted(columns: Array, values: Array, means: Means, drift: Drift, modes: M
     freedom = len(rows) - len(beta)
     is_known = means.white_var is not None
     logs = modes.log_white + np.log(total).sum() + 2 * np.log(np.abs(np.diag(r))).sum()
-    logs += len(turning) * np.log(known_var) if len(turning) else 0.0
     likelihood = means.log_prior(drift) - 0.5 * (logs + (chi2 if is_known else freedom * np.log(chi2)))
     scale = max(chi2 / freedom, 1.0) if is_known else chi2 / freedom
     inverse, found = np.linalg.inv(r), beta / size

@@ -101,7 +101,7 @@ def _left(data: FitData, preset: Preset, seen: NDArray[np.bool_], tested: NDArra
     part = data.take(seen)
     model, _ = preset.build(part)
     whole = solve_axes(data, preset.build(data)[0])
-    solved = solve_axes(part, model, whole.solutions)
+    solved = solve_axes(part, model, whole.noise)
     return residuals(FittedModel(model, solved.fits), data.take(tested), solved.nuisance)["z"]
 
 

@@ -26,7 +26,7 @@ from labctl.fitting.models.fitted_model import FittedModel, without
 from labctl.fitting.models.force_sensitivity import EFFECTS as OF_FORCE
 from labctl.fitting.models.presets import Preset, changed
 from labctl.fitting.numeric.arrays import Array
-from labctl.fitting.numeric.least_squares import Solution
+from labctl.fitting.numeric.drift_noise import Noise
 from labctl.progress import report_stage
 
 #: A part is tested within the temperatures that the others were fitted at, and so far beyond, K.
@@ -117,7 +117,7 @@ def exported_errors(data: FitData, model: ErrorModel, beside: tuple[Term, ...], 
     """
     presets = (changed(model, beside), changed(model, (*beside, term)))
     try:
-        whole = [solve_axes(data, preset.build(data)[0]).solutions for preset in presets]
+        whole = [solve_axes(data, preset.build(data)[0]).noise for preset in presets]
     except LabctlError:
         return Exported(None, None)
     errors: tuple[list[dict[str, Array]], list[dict[str, Array]]] = ([], [])
@@ -159,14 +159,12 @@ def _pooled(parts: Sequence[dict[str, Array]]) -> float | None:
     return rms({axis: np.concatenate([part[axis] for part in parts]) for axis in parts[0]}) if parts else None
 
 
-def _left(
-    data_used: FitData, left_out: FitData, preset: Preset, axis_solutions: Mapping[str, Solution]
-) -> dict[str, Array]:
+def _left(data_used: FitData, left_out: FitData, preset: Preset, noise: Mapping[str, Noise]) -> dict[str, Array]:
     """Return axis -> errors of data sets left out, corrected by what would be exported of a fit to the others."""
     model, rows = preset.build(data_used)
     training = data_used.take(rows)
     require_enough_data(training, model)
-    solutions = solve_axes(training, model, axis_solutions)
+    solutions = solve_axes(training, model, noise)
     fitted = FittedModel(model, solutions.fits)
     for term in model.terms:
         fitted = fitted if is_carried(term) else without(fitted, term.effect)

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.numeric.arrays import Array
-from labctl.fitting.numeric.drift_noise import Scatter
 from labctl.recording import RecordingInfo
 from labctl.recording.positions import Position
 
@@ -29,39 +27,6 @@ def up_rate_dps(info: RecordingInfo) -> float:
 def turning_size_dps(info: RecordingInfo) -> float:
     """Return the size of the Earth's rate that goes round with the table, deg/s; 0 where the latitude is not known."""
     return 0.0 if info.latitude_deg is None else EARTH_RATE_DPS * math.cos(math.radians(info.latitude_deg))
-
-
-def with_known_size(
-    columns: Array, turning: Array, y: Array, scatter: Scatter, size_dps: float
-) -> tuple[Array, Array, Scatter]:
-    """Return design, y and scatter with the turning columns beside the model's, and what is known of their size.
-
-    Only the direction of north is unknown: each of cosine and sine is 0 with the standard deviation that a vector of
-    the known size has along a random direction, said by one more row for each.
-    """
-    return with_prior(columns, turning, y, scatter, np.full(turning.shape[1], size_dps**2 / 2))
-
-
-def with_prior(
-    columns: Array, extra: Array, y: Array, scatter: Scatter, variance: Array
-) -> tuple[Array, Array, Scatter]:
-    """Return design, y and scatter with extra columns (m, e) beside the model's, each 0 with a known variance (e,).
-
-    What is known of a column is said by one more row. Without a known noise of the rows nothing is added.
-    """
-    more = extra.shape[1]
-    if more == 0 or scatter.white_var is None:
-        return columns, y, scatter
-    upper = np.column_stack([columns, np.vstack([extra, np.zeros((len(columns) - len(extra), more))])])
-    lower = np.column_stack([np.zeros((more, columns.shape[1])), np.eye(more)])
-    extended = replace(
-        scatter,
-        t_s=np.concatenate([scatter.t_s, np.zeros(more)]),
-        run=np.concatenate([scatter.run, min(int(scatter.run.min()), 0) - 1 - np.arange(more)]),
-        rate_dps=np.concatenate([scatter.rate_dps, np.zeros(more)]),
-        white_var=np.concatenate([scatter.white_var, variance]),
-    )
-    return np.vstack([upper, lower]), np.concatenate([y, np.zeros(more)]), extended
 
 
 def turning_columns(info: RecordingInfo, channels: Channels, axis: str) -> Array:

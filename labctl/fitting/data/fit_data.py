@@ -81,7 +81,7 @@ class FitData:
     def angle_columns(self, axis: str) -> AngleColumns:
         """Return the regressors of the angles that the mountings separate, of one output; none where they are known."""
         placed = placed_rad(self.info.standards)
-        return AngleColumns() if self.angles_known else angle_columns(self.channels, axis, placed)
+        return AngleColumns.none(len(self)) if self.angles_known else angle_columns(self.channels, axis, placed)
 
     def true_rate_dps(self, axis: str) -> Array:
         """Return the true rate along an axis, (m,) deg/s."""

@@ -25,7 +25,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache, lru_cache
 
 import numpy as np
@@ -45,9 +45,6 @@ ANGLE_QUANTITIES = ("fixture_angle", "tilt", "mounting_repeatability")
 PARTS, WAVES = ("fixture", "table"), ("cos", "sin")
 #: End of the name of what a single mounting is off by.
 PLACED = " placed"
-#: Its coefficients are in units of so little of the angle that their standard deviation is this number: far above the
-#: drift of any gyro in deg/s, which a fit adds to what is known of every coefficient.
-PLACED_SIZE = 10.0
 #: Shares of a singular value below which a direction is not seen.
 UNSEEN = 1e-9
 
@@ -99,10 +96,15 @@ class _Scheme:
 class AngleColumns:
     """Regressors of what the mountings of some rows separate, beside the misalignments of one output."""
 
-    names: tuple[str, ...] = ()  #: of the l angles
-    combined: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))  #: (l, k)
-    values: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))  #: (n, k) deg/s per radian
-    size: Array = field(default_factory=lambda: np.zeros(0))  #: (k,) standard deviation before the measurement
+    names: tuple[str, ...]  #: of the l angles
+    combined: NDArray[np.float64]  #: (l, k)
+    values: NDArray[np.float64]  #: (n, k) deg/s per radian
+    size: Array  #: (k,) standard deviation before the measurement, rad
+
+    @classmethod
+    def none(cls, rows: int) -> AngleColumns:
+        """No angle is separated, in so many rows."""
+        return cls((), np.zeros((0, 0)), np.zeros((rows, 0)), np.zeros(0))
 
     def __len__(self) -> int:
         """Return k."""
@@ -119,7 +121,7 @@ def angle_columns(channels: Channels, axis: str, placed_rad: float = 0.0) -> Ang
     `placed_rad` is the standard deviation by which one mounting differs from the same another time (`placed_rad`).
     """
     if len(recordings_in(channels.columns)) > 1:
-        return AngleColumns(values=np.zeros((len(channels), 0)))
+        return AngleColumns.none(len(channels))
     names: list[str] = []
     values, blocks, sizes = [np.zeros((len(channels), 0))], [], [np.zeros(0)]
     for scheme in _schemes(turned_positions(channels), axis):
@@ -128,9 +130,9 @@ def angle_columns(channels: Channels, axis: str, placed_rad: float = 0.0) -> Ang
         placed = [f"{position}{PLACED}" for position in scheme.positions] if placed_rad else []
         regressors = np.column_stack([angle_regressor(channels, name) for name in (*scheme.names, *placed)])
         names += [*scheme.names, *placed]
-        blocks.append(block_diagonal([scheme.separated, np.eye(len(placed)) * placed_rad / PLACED_SIZE]))
+        blocks.append(block_diagonal([scheme.separated, np.eye(len(placed))]))
         values.append(regressors @ blocks[-1])
-        sizes += [np.full(scheme.separated.shape[1], WIDE_RAD), np.full(len(placed), PLACED_SIZE)]
+        sizes += [np.full(scheme.separated.shape[1], WIDE_RAD), np.full(len(placed), placed_rad)]
     for position in tilted_beside(turned_positions(channels)):
         names.append(_tilt_of(position))
         blocks.append(np.eye(1))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,9 +35,9 @@ class AxisDesign:
     turning: NDArray[np.float64]  #: (m, e): the Earth's rate that goes round with the table
     offset_dps: Array  #: (m,): held coefficients, and what laws at their present coefficients have beside the tangent
     held: HeldPart  #: coefficients that are not estimated; their part of the error is in `offset_dps`
-    laws: tuple[str, ...] = ()  #: names of the coefficients that enter by a law
-    shifts: tuple[Shift, ...] = ()  #: what differs between recordings, where there are several
-    angles: AngleColumns = field(default_factory=AngleColumns)  #: of the mountings, as far as they are separated
+    laws: tuple[str, ...]  #: names of the coefficients that enter by a law
+    shifts: tuple[Shift, ...]  #: what differs between recordings, where there are several
+    angles: AngleColumns  #: of the mountings, as far as they are separated
 
 
 def axis_design(

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.errors import NotEnoughData
-from labctl.fitting.data.earth_rate import turning_columns, turning_size_dps, with_known_size, with_prior
+from labctl.fitting.data.earth_rate import turning_columns, turning_size_dps
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.data.mounting_angles import leaning_rates
 from labctl.fitting.data.response import TIME_CONSTANT
@@ -26,14 +26,15 @@ from labctl.fitting.estimation.delay_and_bandwidth import (
     without_response,
 )
 from labctl.fitting.estimation.held import considered, joint_covariance
-from labctl.fitting.estimation.prior import CoefficientPrior, coefficient_names, with_coefficient_prior
+from labctl.fitting.estimation.prior import CoefficientPrior, coefficient_names
 from labctl.fitting.estimation.reference_time import TimeErrors, time_errors
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.error_part import ErrorPart
 from labctl.fitting.models.fitted_model import AxisFit, FittedModel
 from labctl.fitting.numeric.arrays import Array
-from labctl.fitting.numeric.drift_noise import Scatter
+from labctl.fitting.numeric.drift_noise import Noise, Scatter
 from labctl.fitting.numeric.least_squares import Solution, rank_of, solve
+from labctl.fitting.numeric.prior_rows import PriorRows
 from labctl.fitting.numeric.variance_components import RandomEffects
 
 #: Steps after which a nonlinear coefficient is taken as it is.
@@ -77,6 +78,11 @@ class AxisSolutions:
     nuisance: Mapping[str, Nuisance]  #: what is no part of the model: the Earth's rate, shifts between recordings
 
     @property
+    def noise(self) -> dict[str, Noise]:
+        """The noise that the data of each axis were weighted by."""
+        return {axis: solution.noise for axis, solution in self.solutions.items()}
+
+    @property
     def turning(self) -> dict[str, Array]:
         """The Earth's rate that goes round with the table, axis -> cosine and sine per position, deg/s."""
         return {axis: axis_nuisance.turning for axis, axis_nuisance in self.nuisance.items()}
@@ -85,10 +91,10 @@ class AxisSolutions:
 def solve_axes(
     data: FitData,
     model: ErrorModel,
-    fixed: Mapping[str, Solution] | None = None,
+    noise: Mapping[str, Noise] | None = None,
     prior: CoefficientPrior | None = None,
 ) -> AxisSolutions:
-    """Fit every axis of a model; with `fixed` the drift of each axis is that solution's and not searched for.
+    """Fit every axis of a model; `noise` is that of each axis by another fit, and then not searched for.
 
     `prior` is what is known of the coefficients beside the data.
 
@@ -97,20 +103,20 @@ def solve_axes(
 
     Raises NotEnoughData where the data sets do not determine the coefficients.
     """
-    solutions = _solve_each(data, model, fixed, prior)
+    solutions = _solve_each(data, model, noise, prior)
     if not any(each.angles_rad for each in solutions.nuisance.values()):
         return solutions
     rates = leaning(data, solutions.nuisance).channels.rates
-    again = _solve_each(replace(data, channels=data.channels.with_rates(rates)), model, fixed, prior)
+    again = _solve_each(replace(data, channels=data.channels.with_rates(rates)), model, noise, prior)
     return replace(again, nuisance={axis: solutions.nuisance[axis].plus(each) for axis, each in again.nuisance.items()})
 
 
 def _solve_each(
-    data: FitData, model: ErrorModel, fixed: Mapping[str, Solution] | None, prior: CoefficientPrior | None
+    data: FitData, model: ErrorModel, noise: Mapping[str, Noise] | None, prior: CoefficientPrior | None
 ) -> AxisSolutions:
     fits, solutions, nuisance = {}, {}, {}
     for axis in data.outputs:
-        design, solution, late = _converged(data, model, axis, fixed[axis] if fixed else None, prior)
+        design, solution, late = _converged(data, model, axis, noise[axis] if noise else None, prior)
         solution = with_common_error(data, axis, design.columns, solution)
         solution = _with_radius_error(data, model, axis, design, solution)
         fits[axis] = _axis_fit(design, solution, late)
@@ -150,7 +156,7 @@ def leaning(data: FitData, nuisance: Mapping[str, Nuisance]) -> FitData:
 
 
 def _converged(
-    data: FitData, model: ErrorModel, axis: str, fixed: Solution | None, prior: CoefficientPrior | None
+    data: FitData, model: ErrorModel, axis: str, noise: Noise | None, prior: CoefficientPrior | None
 ) -> tuple[AxisDesign, Solution, TimeErrors | None]:
     """Return the design at the solution, the solution, and the errors of the reference's time that are in it.
 
@@ -161,7 +167,7 @@ def _converged(
     data = data.through(response)
     known = frozenset[str]() if prior is None else prior.known(axis)
     design = axis_design(data, model, axis, known=known)
-    solution = _solve_axis(data, model, axis, design, fixed, prior=prior)
+    solution = _solve_axis(data, model, axis, design, noise, prior=prior)
     for _ in range(GAUSS_NEWTON_STEPS if design.laws else 0):
         before, at = solution.values, _law_coefficients(design, solution)
         if data.channels.profile is not None:
@@ -169,12 +175,12 @@ def _converged(
             response = next_response(response, response_at(at), model, u_s)
             data, at = data.through(response), with_response(at, response)
         design = axis_design(data, model, axis, at, known)
-        solution = _solve_axis(data, model, axis, design, fixed or solution, prior=prior)
+        solution = _solve_axis(data, model, axis, design, noise or solution.noise, prior=prior)
         if np.allclose(solution.values, before, rtol=1e-7, atol=1e-14):
             break
     late = time_errors(data, axis)
     if design.laws or late is not None:
-        solution = _solve_axis(data, model, axis, design, fixed, late, prior)
+        solution = _solve_axis(data, model, axis, design, noise, late, prior)
     return design, solution, late
 
 
@@ -189,7 +195,7 @@ def _solve_axis(
     model: ErrorModel,
     axis: str,
     design: AxisDesign,
-    fixed: Solution | None,
+    noise: Noise | None,
     late: TimeErrors | None = None,
     prior: CoefficientPrior | None = None,
 ) -> Solution:
@@ -199,26 +205,43 @@ def _solve_axis(
             f"{model.name} ({', '.join(model.effect_ids)}); record rates about the other axes of the unit too"
         )
     y = data.outputs[axis] - data.true_rate_dps(axis) - design.offset_dps
-    axis_scatter, random = data.scatter(axis), None
+    scatter, random = data.scatter(axis), None
     if design.shifts or len(design.angles) or prior is not None:
-        axis_scatter = _with_white_noise(design, y, axis_scatter)
-    columns, y, scatter = with_known_size(design.columns, design.turning, y, axis_scatter, turning_size_dps(data.info))
-    columns, y, scatter = with_prior(columns, design.angles.values, y, scatter, design.angles.size**2)
+        scatter = _with_white_noise(design, y, scatter)
+    columns, known = design.columns, PriorRows.none(design.columns.shape[1])
+    if scatter.white_var is not None:  # without it, what is known has no weight beside the data
+        more, u = beside(data, design)
+        columns, known = np.column_stack([columns, more]), known.with_coefficients(u)
+        if prior is not None:
+            known = known.plus(*prior_rows(design, model, axis, prior))
     if design.shifts:
-        wide = np.array([KINDS[shift.kind].largest for shift in design.shifts])
-        values = np.column_stack([shift.values for shift in design.shifts])
-        columns, y, scatter = with_prior(columns, values, y, scatter, wide**2)
         kinds = np.array([shift.kind for shift in design.shifts])
-        random = RandomEffects(np.unique(kinds, return_inverse=True)[1], wide)
-    if prior is not None:
-        columns, y, scatter = with_coefficient_prior(columns, y, scatter, *prior_rows(design, model, axis, prior))
-    columns, y, scatter, known_beside = considered(design.held, columns, y, scatter)
+        random = RandomEffects(np.unique(kinds, return_inverse=True)[1], _largest(design))
+    known_beside = considered(design.held, columns, knows_white=scatter.white_var is not None)
     if late is not None:
-        known_beside = late.beside(known_beside, len(columns))
+        known_beside = late.beside(known_beside)
+    drift = noise.drift_beside(scatter) if noise else None
     try:
-        return solve(columns, y, scatter, fixed.drift if fixed else None, random, known_beside)
+        return solve(columns, y, scatter, drift, random, known_beside, known)
     except NotEnoughData as error:
         raise NotEnoughData(f"{data.info.serial}, axis {axis}, model {model.name}: {error}") from None
+
+
+def beside(data: FitData, design: AxisDesign) -> tuple[NDArray[np.float64], Array]:
+    """Return what is fitted beside a model, columns (m, b), and the standard uncertainty of each coefficient, (b,).
+
+    They are the Earth's rate that goes round, the angles of the mountings and the shifts between recordings. Of the
+    Earth's rate only the direction of north is unknown: each of cosine and sine is 0 with the standard deviation that
+    a vector of the known size has along a random direction.
+    """
+    turning_u = np.full(design.turning.shape[1], turning_size_dps(data.info) / np.sqrt(2.0))
+    shifts = [shift.values[:, None] for shift in design.shifts]
+    columns = np.concatenate([design.turning, design.angles.values, *shifts], axis=1)
+    return columns, np.concatenate([turning_u, design.angles.size, _largest(design)])
+
+
+def _largest(design: AxisDesign) -> Array:
+    return np.array([KINDS[shift.kind].largest for shift in design.shifts])
 
 
 def prior_rows(

@@ -39,6 +39,7 @@ from labctl.fitting.models.inversion import NotConverged
 from labctl.fitting.models.presets import POSES, Preset, preset_for
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.blas_threads import single_threaded
+from labctl.fitting.numeric.drift_noise import Noise
 from labctl.fitting.numeric.least_squares import Solution
 from labctl.recording import Recording
 
@@ -54,11 +55,11 @@ BEYOND_K = 1.0
 
 
 def errors_by_leg(
-    data: FitData, preset: Preset, solutions: Mapping[str, Solution], prior: CoefficientPrior | None = None
+    data: FitData, preset: Preset, noise: Mapping[str, Noise], prior: CoefficientPrior | None = None
 ) -> list[LegErrorJson]:
     """Return the error of legs by fits to others; none where the temperature goes one way only.
 
-    The drift of each axis stays that of `solutions`, the fit to all data sets; `prior` is in each fit.
+    The `noise` of each axis stays that of the fit to all data sets; `prior` is in each fit.
     """
     if not data.channels.history.thermometer or "t_s" not in data.channels:
         return []
@@ -68,18 +69,18 @@ def errors_by_leg(
     if min(int(up.sum()), int(down.sum())) < MIN_SETS:
         return []
     leg_errors = [
-        _tested(data, preset, solutions, prior, [(up, down)], ("heating", "cooling")),
-        _tested(data, preset, solutions, prior, [(down, up)], ("cooling", "heating")),
+        _tested(data, preset, noise, prior, [(up, down)], ("heating", "cooling")),
+        _tested(data, preset, noise, prior, [(down, up)], ("cooling", "heating")),
     ]
     numbers, counts = np.unique(legs[legs != 0], return_counts=True)
     if 2 < len(numbers) <= MAX_LEGS and counts.min() >= MIN_SETS:
         pairs = [((legs != 0) & (legs != number), legs == number) for number in numbers]
-        leg_errors.append(_tested(data, preset, solutions, prior, pairs, ("all legs but one", "each leg in turn")))
+        leg_errors.append(_tested(data, preset, noise, prior, pairs, ("all legs but one", "each leg in turn")))
     return leg_errors
 
 
 def _tested(
-    data: FitData, preset: Preset, solutions: Mapping[str, Solution], prior: CoefficientPrior | None,
+    data: FitData, preset: Preset, noise: Mapping[str, Noise], prior: CoefficientPrior | None,
     pairs: list[tuple[NDArray[np.bool_], NDArray[np.bool_]]], names: tuple[str, str],
 ) -> LegErrorJson:  # fmt: skip
     """Return the error of each second part of the data sets by a fit to the first, pooled."""
@@ -97,7 +98,7 @@ def _tested(
         try:
             model, rows = preset.build(data_used)
             training = data_used.take(rows)
-            solved = _solved(training, model, solutions, prior)
+            solved = _solved(training, model, noise, prior)
             residuals_dps = residuals(FittedModel(model, solved.fits), data_tested, solved.nuisance)
         except LabctlError as error:
             return _answer(names, None, 0, f"the {names[0]} alone does not determine the model: {error}")
@@ -164,11 +165,11 @@ def _at_rate(channels: Channels, rate_dps: float) -> Channels:
 
 
 def held_out_errors(
-    data: FitData, preset: Preset, solutions: Mapping[str, Solution], prior: CoefficientPrior | None = None
+    data: FitData, preset: Preset, noise: Mapping[str, Noise], prior: CoefficientPrior | None = None
 ) -> dict[str, Array]:
     """Return axis -> (m,) deg/s, corrected minus true rate of each part left out in turn (`held_out_pairs`).
 
-    The drift of each axis stays that of `solutions`, the fit to all data sets; `prior` is in each fit. Empty where a
+    The `noise` of each axis stays that of the fit to all data sets; `prior` is in each fit. Empty where a
     fold leaves too little.
     """
     pairs = data.held_out_pairs
@@ -180,7 +181,7 @@ def held_out_errors(
             return {}
         try:
             model, rows = preset.build(data_used)
-            solved = _solved(data_used.take(rows), model, solutions, prior)
+            solved = _solved(data_used.take(rows), model, noise, prior)
         except NotEnoughData:
             return {}
         try:
@@ -197,12 +198,12 @@ def held_out_errors(
 
 
 def _solved(
-    data: FitData, model: ErrorModel, solutions: Mapping[str, Solution] | None, prior: CoefficientPrior | None
+    data: FitData, model: ErrorModel, noise: Mapping[str, Noise] | None, prior: CoefficientPrior | None
 ) -> AxisSolutions:
     """Fit a model to data sets, which have to determine it where there is no prior. Raises NotEnoughData."""
     if prior is None:
         require_enough_data(data, model)
-    return solve_axes(data, model, solutions, prior)
+    return solve_axes(data, model, noise, prior)
 
 
 def fit(
@@ -241,8 +242,8 @@ def fit_preset(data: FitData, preset: Preset, prior: CoefficientPrior | None = N
     raw = {axis: data.outputs[axis] - data.true_rate_dps(axis) for axis in data.outputs}
     floor, leaned = data.noise_floor, leaning(data, solved.nuisance)
     error = ErrorFigures(
-        rms(raw), rms(residual), rms(held_out_errors(leaned, preset, solved.solutions, prior)), floor.rms_dps,
-        floor.source, tuple(errors_by_leg(leaned, preset, solved.solutions, prior)),
+        rms(raw), rms(residual), rms(held_out_errors(leaned, preset, solved.noise, prior)), floor.rms_dps,
+        floor.source, tuple(errors_by_leg(leaned, preset, solved.noise, prior)),
     )  # fmt: skip
     return FitResult(
         fitted,

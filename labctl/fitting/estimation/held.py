@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from labctl.errors import BadInput
 from labctl.fitting.data.channels import Argument, Channels
-from labctl.fitting.data.earth_rate import with_prior
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.effects import Reference, kind_of
 from labctl.fitting.estimation.requirements import require_channels
@@ -20,7 +19,6 @@ from labctl.fitting.models.held import Held, HeldCoefficient
 from labctl.fitting.models.presets import Preset, holding
 from labctl.fitting.models.temperature import LagrangeTable
 from labctl.fitting.numeric.arrays import Array, block_diagonal
-from labctl.fitting.numeric.drift_noise import Scatter
 from labctl.fitting.numeric.least_squares import Considered, Solution, rank_of
 from labctl.recording import OutputUnit, RecordingInfo
 
@@ -29,9 +27,6 @@ from labctl.recording import OutputUnit, RecordingInfo
 # Tapley, Schutz and Born 2004, Statistical Orbit Determination, chapter 6. The data y = X f + H c + e are fitted for f
 # with c held at values of covariance U: f = (X'WX)^-1 X'W (y - H c). An error of c moves f by G = -(X'WX)^-1 X'W H, so
 # that f has the covariance (X'WX)^-1 + G U G', and f and c the covariance G U in common.
-
-#: The standard deviation, deg/s, that the row of a prior has in scaled columns: a drift adds nothing to that.
-PRIOR = 1e3
 
 
 @dataclass(frozen=True)
@@ -79,27 +74,21 @@ class HeldColumns:
         )
 
 
-def considered(
-    held: HeldPart, columns: NDArray[np.float64], y: Array, scatter: Scatter
-) -> tuple[NDArray[np.float64], Array, Scatter, Considered | None]:
-    """Return design (n, k), y and scatter of the estimated columns, and what is known beside them; None: nothing.
+def considered(held: HeldPart, columns: NDArray[np.float64], *, knows_white: bool) -> Considered | None:
+    """Return what is known beside estimated columns (m, k); None: nothing.
 
     What an error of a held coefficient leaves in the data is no noise, so the noise is estimated beside it: with its
-    uncertainty as a prior, a row for each; or freely, where the white noise, and so the weight of that row, is unknown.
+    uncertainty as a prior; or freely, where the white noise, and so the weight of a prior, is unknown.
     A coefficient without uncertainty is taken as exact, and what it leaves counts as noise.
     """
     if held.columns.shape[1] == 0:
-        return columns, y, scatter, None
+        return None
     has_u = (np.nan_to_num(held.u) > 0) & np.any(held.columns, axis=0)
-    uncertain = held.columns[:, has_u] * held.u[has_u] / PRIOR
-    k = columns.shape[1]
-    if scatter.white_var is not None:
-        whole, y, scatter = with_prior(columns, uncertain, y, scatter, np.full(uncertain.shape[1], PRIOR**2))
-        columns, beside = whole[:, :k], whole[:, k:]
-    else:
-        beside = _determined(columns, uncertain)
-    below = np.zeros((len(columns) - len(held.columns), held.columns.shape[1]))
-    return columns, y, scatter, Considered(np.vstack([held.columns, below]), beside)
+    beside = held.columns[:, has_u] * held.u[has_u]
+    if knows_white:
+        return Considered(held.columns, beside, np.ones(beside.shape[1]))
+    beside = _determined(columns, beside)
+    return Considered(held.columns, beside, np.full(beside.shape[1], np.inf))
 
 
 def _determined(columns: NDArray[np.float64], more: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -22,7 +22,7 @@ from labctl.fitting.models.fitted_model import AxisFit, FittedModel
 from labctl.fitting.models.inversion import NotConverged
 from labctl.fitting.models.presets import Preset
 from labctl.fitting.numeric.arrays import Array
-from labctl.fitting.numeric.least_squares import Solution
+from labctl.fitting.numeric.drift_noise import Noise
 from labctl.shown_unit import shown_unit
 
 #: The effects that a shift between recordings adds to, by kind of shift.
@@ -55,9 +55,7 @@ def of_each_recording(data: FitData) -> dict[int, FitData]:
     return {number: data.take(of == number) for number in recordings_in(data.channels.columns)}
 
 
-def agreement_of(
-    data: FitData, model: ErrorModel, together: Mapping[str, Solution]
-) -> tuple[list[EffectAgreement], str]:
+def agreement_of(data: FitData, model: ErrorModel, together: Mapping[str, Noise]) -> tuple[list[EffectAgreement], str]:
     """Return how well recordings agree on each effect of the unit's model, and why not where they cannot be compared.
 
     Each is weighted by the noise of the fit to all of them, `together`: a fit to one alone may underestimate its drift.
@@ -169,7 +167,7 @@ def joint_findings(data: FitData, model: ErrorModel, preset: Preset, solutions: 
     if len(recordings) < 2:
         return None
     repeatability = {axis: _repeatability(data, axis, solutions) for axis in data.outputs}
-    agreement, not_compared = agreement_of(data, model, solutions.solutions)
+    agreement, not_compared = agreement_of(data, model, solutions.noise)
     held_out, pooled = _held_out(data, preset)
     return {
         "recordings": recordings,

@@ -19,10 +19,7 @@ from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.presets import Preset, Rows
 from labctl.fitting.models.temperature import LagrangeTable
 from labctl.fitting.numeric.arrays import Array
-from labctl.fitting.numeric.drift_noise import Scatter
 
-#: Size of the noise that the rows of a prior are scaled to, deg/s: no drift of a fit adds anything to it.
-ROW_DPS = 1e4
 #: Share of a variance that keeps a covariance invertible.
 TINY = 1e-10
 
@@ -97,25 +94,3 @@ def coefficient_names(model: ErrorModel, axis: str, owners: Sequence[str], names
         else:
             listed += [f"{axis}.{name}{place}" for place in places]
     return listed
-
-
-def with_coefficient_prior(
-    columns: NDArray[np.float64], y: Array, scatter: Scatter, rows: NDArray[np.float64], values: Array
-) -> tuple[NDArray[np.float64], Array, Scatter]:
-    """Return design (m, c), y and scatter with whitened rows (q, c0) of a prior below, on the first c0 columns.
-
-    Without a known noise of the data sets nothing is added: a prior has no weight beside them.
-    """
-    q = len(values)
-    if q == 0 or scatter.white_var is None:
-        return columns, y, scatter
-    below = np.zeros((q, columns.shape[1]))
-    below[:, : rows.shape[1]] = ROW_DPS * rows
-    extended = replace(
-        scatter,
-        t_s=np.concatenate([scatter.t_s, np.zeros(q)]),
-        run=np.concatenate([scatter.run, min(int(scatter.run.min()), 0) - 1 - np.arange(q)]),
-        rate_dps=np.concatenate([scatter.rate_dps, np.zeros(q)]),
-        white_var=np.concatenate([scatter.white_var, np.full(q, ROW_DPS**2)]),
-    )
-    return np.vstack([columns, below]), np.concatenate([y, ROW_DPS * values]), extended

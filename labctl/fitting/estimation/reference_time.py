@@ -29,12 +29,11 @@ class TimeErrors:
     own_u_s: float  #: root mean square over the data sets
     is_common_stated: bool = True  #: also as 0, where the time of the reference is known
 
-    def beside(self, known: Considered | None, rows: int) -> Considered:
-        """Return these as considered columns behind those that are; a design has `rows`, priors below the data."""
-        more = np.vstack([self.columns, np.zeros((rows - len(self.columns), self.columns.shape[1]))])
+    def beside(self, known: Considered | None) -> Considered:
+        """Return these as considered columns behind those that are."""
         if known is None:
-            return Considered(more, np.zeros((rows, 0)))
-        return replace(known, columns=np.column_stack([known.columns, more]))
+            return Considered(self.columns, np.zeros((len(self.columns), 0)), np.zeros(0))
+        return replace(known, columns=np.column_stack([known.columns, self.columns]))
 
     def parts(self, along: NDArray[np.float64]) -> tuple[ErrorPart, ...]:
         """Return the parts of a covariance; `along` (k, 1 + j) is the change of the coefficients by each."""

@@ -84,7 +84,7 @@ def _beside_base(
     base = axis_design(data, fitted.model, axis).columns
     scatter = data.scatter(axis)
     white = scatter.white_var if scatter.white_var is not None else np.ones(len(data))
-    rows = whitened(scatter, [solution.drift], white, np.column_stack([base, slopes]))[0][0]
+    rows = whitened(scatter, [solution.noise.drift_beside(scatter)], white, np.column_stack([base, slopes]))[0][0]
     base_columns, moved = rows[:, : base.shape[1]], rows[:, base.shape[1] :]
     size = np.maximum(np.linalg.norm(base_columns, axis=0), 1e-300)
     coordinates, *_ = np.linalg.lstsq(base_columns / size, moved, rcond=1e-9)

@@ -13,11 +13,9 @@ from scipy.special import chdtrc
 from labctl.errors import BadInput
 from labctl.fitting.data.channels import Argument
 from labctl.fitting.data.covered import Covered
-from labctl.fitting.data.earth_rate import turning_size_dps
 from labctl.fitting.data.fit_data import FitData, fit_data_of
-from labctl.fitting.data.shifts import KINDS
 from labctl.fitting.estimation.axis_design import AxisDesign, axis_design
-from labctl.fitting.estimation.axis_solutions import prior_rows, solve_axes
+from labctl.fitting.estimation.axis_solutions import beside, prior_rows, solve_axes
 from labctl.fitting.estimation.fit import fit_preset
 from labctl.fitting.estimation.prior import CoefficientPrior, with_reference
 from labctl.fitting.estimation.result import FitResult
@@ -133,8 +131,8 @@ def contradiction(data: FitData, model: ErrorModel, axis: str, prior: Coefficien
     prior. What the data sets do not leave over, and directions that the prior does not know, say nothing.
     """
     design = axis_design(data, model, axis, known=prior.known(axis))
-    beside = _beside(data, design)
-    whole = np.column_stack([design.columns, beside[0]])
+    more, more_u = beside(data, design)
+    whole = np.column_stack([design.columns, more])
     size = np.linalg.norm(whole, axis=0)
     left, values, right = np.linalg.svd(whole / np.where(size > 0, size, 1.0), full_matrices=False)
     seen = values > MIN_DIRECTION * values[0]
@@ -144,21 +142,12 @@ def contradiction(data: FitData, model: ErrorModel, axis: str, prior: Coefficien
     y = data.outputs[axis] - data.true_rate_dps(axis) - design.offset_dps
     solution = solve(left[:, seen], y, scatter)
     turned = values[seen, None] * right[seen] * np.where(size > 0, size, 0.0)  # (r, c + b): coefficients to directions
-    mean, covariance = _expected(design, model, axis, prior, beside[1])
+    mean, covariance = _expected(design, model, axis, prior, more_u)
     off = solution.values - turned @ mean
     spread = solution.covariance + turned @ covariance @ turned.T
     root = np.sqrt(np.diag(spread))
     chi2 = float(off / root @ np.linalg.solve(spread / np.outer(root, root), off / root))
     return float(chdtrc(len(off), chi2))
-
-
-def _beside(data: FitData, design: AxisDesign) -> tuple[NDArray[np.float64], Array]:
-    """Return what is fitted beside the model: columns (m, b), and standard deviations of their coefficients (b,)."""
-    turning, angles = design.turning, design.angles
-    columns = [turning, angles.values, *(shift.values[:, None] for shift in design.shifts)]
-    turning_u = turning_size_dps(data.info) / np.sqrt(2.0) if turning.shape[1] else 0.0
-    shifts = np.array([KINDS[shift.kind].largest for shift in design.shifts])
-    return np.column_stack(columns), np.concatenate([np.full(turning.shape[1], turning_u), angles.size, shifts])
 
 
 def _expected(

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -77,6 +77,24 @@ class Drift:
         return tuple(np.geomspace(self.shortest_tau_s, self.tau_s, steps + 1).tolist())
 
 
+@dataclass(frozen=True)
+class Noise:
+    """The noise that a fit was weighted by: its drift, and the white noise of a mean beside it, deg/s."""
+
+    drift: Drift
+    white_dps: float
+
+    def drift_beside(self, scatter: Scatter) -> Drift:
+        """Return the drift as `solve` takes it: in units of the white noise where no readings state that."""
+        if scatter.white_var is not None:
+            return self.drift
+        ratio = 1.0 / max(self.white_dps, 1e-300)
+        return replace(self.drift, drift_dps=self.drift.drift_dps * ratio, per_rate=self.drift.per_rate * ratio)
+
+
+NO_DRIFT = Noise(Drift(0.0, 1.0), 1.0)
+
+
 def grid(scatter: Scatter, unexplained_dps: float, per_rate: float = 0.0) -> list[Drift]:
     """Return the drifts to average over, around the scatter that white noise leaves unexplained.
 
@@ -133,10 +151,13 @@ def _points(
     ]
 
 
-def log_prior(scatter: Scatter, drift: Drift) -> float:
-    """Return the log prior of a drift: log-normal about half the data sheet's figure where there is one, else flat."""
+def log_prior(scatter: Scatter, drift: Drift, unit_dps: float = 1.0) -> float:
+    """Return the log prior of a drift: log-normal about half the data sheet's figure where there is one, else flat.
+
+    `unit_dps` is the unit of the drift: the white noise of a mean, where readings do not state it.
+    """
     if scatter.datasheet_drift_dps is None:
         return 0.0
     expected = scatter.datasheet_drift_dps / 2
-    size = max(drift.drift_dps, 0.05 * expected)
+    size = max(drift.drift_dps * unit_dps, 0.05 * expected)
     return float(-0.5 * (np.log(size / expected) / np.log(PRIOR_FACTOR)) ** 2)

@@ -17,8 +17,9 @@ from scipy.linalg import solve_triangular
 from labctl.errors import NotEnoughData
 from labctl.fitting.numeric import drift_noise
 from labctl.fitting.numeric.arrays import Array
-from labctl.fitting.numeric.drift_noise import Drift, Scatter
+from labctl.fitting.numeric.drift_noise import Drift, Noise, Scatter
 from labctl.fitting.numeric.drift_whitening import whitened
+from labctl.fitting.numeric.prior_rows import PriorRows
 from labctl.fitting.numeric.variance_components import Component, RandomEffects, Triangles, mixture
 
 #: Scaled columns are taken as linearly dependent below this ratio of singular values.
@@ -40,6 +41,7 @@ class Solution:
     residual: Array
     white_dps: float | None  #: of a data-set mean; None when only the total is known
     drift: Drift
+    noise: Noise  #: what weighted the data: the same without the factor of what the model lacks
     scale: float  #: factor on the covariance estimated from the residuals; 1 where the white noise is known;
     #: NaN, as the covariance then is, where neither the residuals nor the readings say anything about noise
     components: tuple[Component, ...] = ()  #: spread of each kind of random effect
@@ -51,7 +53,8 @@ class Considered:
     """Columns of coefficients that are known to an uncertainty, and are not estimated; y is without their part."""
 
     columns: NDArray[np.float64]  #: (m, h)
-    beside: NDArray[np.float64]  #: (m, b): those beside which the noise is estimated; a row of m may be their prior
+    beside: NDArray[np.float64]  #: (m, b): those beside which the noise is estimated
+    beside_u: Array  #: (b,) standard uncertainty of the coefficient of each, which is 0; inf: it is free
 
 
 @dataclass(frozen=True)
@@ -84,7 +87,16 @@ class _Fits:
 
         Of a drift that the scatter between data sets does not show, no size is stated.
         """
-        drifts, scale = self.drifts[: self.shown], self.scale[: self.shown]
+        return self._drift(self.scale[: self.shown])
+
+    def noise(self, scatter: Scatter) -> Noise:
+        """Return what weights the data: the drift beside the white noise that is stated, or that the fit leaves."""
+        if scatter.white_var is None:
+            return Noise(self.drift(), float(np.sqrt(self.scale[self.best])))
+        return Noise(self._drift(np.ones_like(self.scale[: self.shown])), float(np.sqrt(scatter.white_var.mean())))
+
+    def _drift(self, scale: Array) -> Drift:
+        drifts = self.drifts[: self.shown]
         evidence = self.log_evidence[: self.shown]
         best, weights = int(np.argmax(evidence)), np.exp(evidence - evidence.max())
         weights /= weights.sum()
@@ -134,21 +146,24 @@ def solve(
     drift: Drift | None = None,
     random: RandomEffects | None = None,
     considered: Considered | None = None,
+    prior: PriorRows | None = None,
 ) -> Solution:
     """Fit y (m,) by design (m, k), weighted by the inverse of its noise; `drift` fixes the noise instead of a grid.
 
-    The last columns are `random` effects where that is given; their wide priors are rows of the design. An error of
-    what is `considered` is no noise: the noise is estimated beside it, and the coefficients without it.
+    Where the white noise is not known, `drift` is in units of it.
+    `prior` is what is known of the k coefficients beside the data; the white noise of the data then has to be known.
+    The last columns are `random` effects where that is given; their wide priors are in `prior`. An error of what is
+    `considered` is no noise: the noise is estimated beside it, and the coefficients without it.
     Raises NotEnoughData when the columns are linearly dependent or there are fewer rows than columns.
     """
-    m, k = design.shape
-    if m < k or rank_of(design) < k:
-        raise NotEnoughData(
-            f"{m} data sets at these rates and temperatures determine only {min(m, rank_of(design))} of the {k} "
-            "coefficients of the model; measure at other rates and temperatures, or leave effects out"
-        )
-    whole = design if considered is None else np.column_stack([design, considered.beside])
-    fits = _at(whole, y, scatter, [drift]) if drift is not None else _over_grid(whole, y, scatter)
+    k = design.shape[1]
+    prior = prior or PriorRows.none(k)
+    _require_determined(design, scatter, prior)
+    whole, known = design, prior
+    if considered is not None:
+        whole = np.column_stack([design, considered.beside])
+        known = prior.with_coefficients(considered.beside_u)
+    fits = _at(whole, y, scatter, [drift], known) if drift is not None else _over_grid(whole, y, scatter, known)
     # the triangle of the first columns is that of a fit of them alone
     fits = replace(fits, r=fits.r[:, :k, :k], projected=fits.projected[:, :k])
     solution = _collect(fits, design, y, scatter)
@@ -156,7 +171,19 @@ def solve(
         solution = _with_random_effects(solution, fits, design, y, random)
     if considered is None:
         return solution
-    return replace(solution, along_held=_along(fits, design, scatter, considered.columns, _tightened(solution, random)))
+    rows = np.vstack([prior.rows, _tightened(solution, random, k)])
+    return replace(solution, along_held=_along(fits, design, scatter, considered.columns, rows))
+
+
+def _require_determined(design: NDArray[np.float64], scatter: Scatter, prior: PriorRows) -> None:
+    m, k = design.shape
+    white_dps = 1.0 if scatter.white_var is None else float(np.sqrt(scatter.white_var.mean()))
+    rank = rank_of(np.vstack([design, prior.rows * white_dps]))
+    if m + len(prior) < k or rank < k:
+        raise NotEnoughData(
+            f"{m} data sets at these rates and temperatures determine only {min(m + len(prior), rank)} of the {k} "
+            "coefficients of the model; measure at other rates and temperatures, or leave effects out"
+        )
 
 
 def drift_beside(columns: NDArray[np.float64], y: Array, scatter: Scatter) -> Drift:
@@ -166,7 +193,8 @@ def drift_beside(columns: NDArray[np.float64], y: Array, scatter: Scatter) -> Dr
     normal equations could spoil.
     """
     y = y - columns @ (columns.T @ y)
-    return _over_grid(columns, y, scatter, drift_noise.grid, _by_normal_equations).drift()
+    nothing = PriorRows.none(columns.shape[1])
+    return _over_grid(columns, y, scatter, nothing, drift_noise.grid, _by_normal_equations).drift()
 
 
 def _all_drifts(scatter: Scatter, unexplained_dps: float, per_rate: float = 0.0) -> list[Drift]:
@@ -180,12 +208,13 @@ def _over_grid(
     design: NDArray[np.float64],
     y: Array,
     scatter: Scatter,
+    prior: PriorRows,
     drifts: Callable[..., list[Drift]] = _all_drifts,
     reduce: _Reduce = _by_qr,
 ) -> _Fits:
     """Return the fits over the grid of drifts; with noise that grows with the rate where that is clearly likelier."""
-    at = partial(_at, design, y, scatter, reduce=reduce)
-    unexplained = _unexplained(design, y, scatter, at([Drift(0.0, 1.0)]).values(0))
+    at = partial(_at, design, y, scatter, prior=prior, reduce=reduce)
+    unexplained = _unexplained(design, y, scatter, prior, at([Drift(0.0, 1.0)]).values(0))
     fits = at(drifts(scatter, unexplained))
     growing = _per_rate(design, y, scatter, fits)
     if growing > 0:
@@ -196,34 +225,40 @@ def _over_grid(
 
 
 def _at(
-    design: NDArray[np.float64], y: Array, scatter: Scatter, drifts: Sequence[Drift], reduce: _Reduce = _by_qr
+    design: NDArray[np.float64],
+    y: Array,
+    scatter: Scatter,
+    drifts: Sequence[Drift],
+    prior: PriorRows,
+    reduce: _Reduce = _by_qr,
 ) -> _Fits:
     """Return the weighted fit and its restricted log likelihood at each drift."""
     has_white = scatter.white_var is not None
     white = scatter.white_var if scatter.white_var is not None else np.ones(len(y))
-    m, k = design.shape
     rows, log_dets = whitened(scatter, drifts, white, np.column_stack([design, y]))
-    r, projected, chi2 = reduce(rows)
+    r, projected, chi2 = reduce(prior.below(rows))
     log_dets = log_dets + 2 * np.log(np.abs(np.diagonal(r, axis1=1, axis2=2))).sum(axis=1)
-    freedom = max(m - k, 1)
+    freedom = max(len(y) + len(prior) - design.shape[1], 1)
     # a chi2 above that of the noise is due to the model, and makes its coefficients as much less certain
     scale = np.maximum(chi2 / freedom, 1.0) if has_white else np.maximum(chi2, 1e-300) / freedom
     fit_terms = chi2 if has_white else freedom * np.log(np.maximum(chi2, 1e-300))
-    priors = np.array([drift_noise.log_prior(scatter, drift) for drift in drifts])
+    units_dps = np.ones(len(drifts)) if has_white else np.sqrt(scale)
+    priors = np.array([drift_noise.log_prior(scatter, *each) for each in zip(drifts, units_dps.tolist(), strict=True)])
     return _Fits(drifts, r, projected, -0.5 * (log_dets + fit_terms) + priors, scale)
 
 
-def _unexplained(design: NDArray[np.float64], y: Array, scatter: Scatter, values: Array) -> float:
+def _unexplained(design: NDArray[np.float64], y: Array, scatter: Scatter, prior: PriorRows, values: Array) -> float:
     """Return the scatter that white noise does not explain, deg/s; in units of the white part when that is unknown."""
     residual = y - design @ values
-    freedom = max(len(y) - design.shape[1], 1)
+    freedom = max(len(y) + len(prior) - design.shape[1], 1)
     total = float(residual @ residual) / freedom
     largest = scatter.largest_drift_dps / max(drift_noise.DRIFT_SIZES)
     if scatter.white_var is None:
         return float(min(1.0, largest / np.sqrt(max(total, 1e-300))))
     # each data set is weighted by the inverse of its white variance: DerSimonian and Laird 1986, eq. 8
     per_white = 1.0 / scatter.white_var
-    excess = float(residual**2 @ per_white) / freedom - 1.0
+    off_prior = prior.values - prior.rows @ values
+    excess = (float(residual**2 @ per_white) + float(off_prior @ off_prior)) / freedom - 1.0
     unexplained = np.sqrt(max(max(excess, 0.01) / float(per_white.mean()), 1e-24))
     return float(min(unexplained, largest))
 
@@ -257,8 +292,9 @@ def _collect(fits: _Fits, design: NDArray[np.float64], y: Array, scatter: Scatte
     # as many coefficients as data sets leave no residuals, and so nothing to be uncertain by
     blind = np.nan if white is None and design.shape[0] == design.shape[1] else 1.0
     return Solution(
-        values, roots @ roots.T * blind, y - design @ values, white, fits.drift(), float(fits.scale[fits.best]) * blind
-    )
+        values, roots @ roots.T * blind, y - design @ values, white, fits.drift(), fits.noise(scatter),
+        float(fits.scale[fits.best]) * blind,
+    )  # fmt: skip
 
 
 def _with_random_effects(
@@ -278,22 +314,27 @@ def _with_random_effects(
     )
 
 
-def _tightened(solution: Solution, random: RandomEffects | None) -> Array:
-    """Return what the found spread of each random effect adds to the root of its prior's precision, (q,)."""
+def _tightened(solution: Solution, random: RandomEffects | None, k: int) -> NDArray[np.float64]:
+    """Return what the found spread of each random effect, the last q of k columns, adds to its prior: rows (q, k)."""
     if random is None:
-        return np.zeros(0)
+        return np.zeros((0, k))
     spread = np.maximum(np.array([component.value for component in solution.components])[random.kind], MIN_SPREAD)
-    return np.asarray(np.sqrt(np.maximum(spread**-2.0 - random.wide**-2.0, 0.0)))
+    rows = np.zeros((len(spread), k))
+    rows[:, k - len(spread) :] = np.diag(np.sqrt(np.maximum(spread**-2.0 - random.wide**-2.0, 0.0)))
+    return rows
 
 
 def _along(
-    fits: _Fits, design: NDArray[np.float64], scatter: Scatter, columns: NDArray[np.float64], tightened: Array
+    fits: _Fits,
+    design: NDArray[np.float64],
+    scatter: Scatter,
+    columns: NDArray[np.float64],
+    prior_rows: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """Return the derivative of the coefficients (k,) along those of columns (m, h), averaged over the noise, (k, h)."""
-    (m, k), q = design.shape, len(tightened)
+    m, k = design.shape
     white = scatter.white_var if scatter.white_var is not None else np.ones(m)
-    below = np.zeros((q, k + columns.shape[1]))
-    below[:, k - q : k] = np.diag(tightened)
+    below = np.column_stack([prior_rows, np.zeros((len(prior_rows), columns.shape[1]))])
     weights = fits.weights()
     counting = np.flatnonzero(~(weights < NEGLIGIBLE_NOISE))
     projected = np.zeros((k, columns.shape[1]))

@@ -28,7 +28,7 @@ from labctl.fitting.models.fitted_model import AxisFit, FittedModel
 from labctl.fitting.models.presets import Preset, preset_for
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.blas_threads import single_threaded
-from labctl.fitting.numeric.drift_noise import Drift
+from labctl.fitting.numeric.drift_noise import NO_DRIFT
 from labctl.fitting.numeric.least_squares import Solution
 from labctl.fitting.uncertainty.budget import Budget, BudgetLine, budget_of
 from labctl.fitting.uncertainty.conditions import conditions_of
@@ -138,9 +138,7 @@ def least_u(data: FitData, preset: Preset, over: Range) -> LargestU:
         model, rows = preset.build(data)
         training = data.take(rows)
         require_enough_data(training, model)
-        none = Drift(0.0, 1.0)
-        start = Solution(np.zeros(0), np.zeros((0, 0)), np.zeros(0), None, none, 1.0)
-        solved = solve_axes(training, model, dict.fromkeys(data.outputs, start))
+        solved = solve_axes(training, model, dict.fromkeys(data.outputs, NO_DRIFT))
         fits = {axis: _by_white(fit, solved.solutions[axis]) for axis, fit in solved.fits.items()}
         exported, _ = FittedModel(model, fits).exported()
         environment = {"temperature": NAME} if is_chambers(data.channels.columns) else {}
@@ -173,7 +171,7 @@ def lack_of_fit(data: FitData, preset: Preset, over: Range, limit_dps: float) ->
     try:
         model, rows = preset.build(data)
         solved = solve_axes(data.take(rows), model)
-        errors = held_out_errors(leaning(data, solved.nuisance), replace(preset, inner_only=True), solved.solutions)
+        errors = held_out_errors(leaning(data, solved.nuisance), replace(preset, inner_only=True), solved.noise)
     except LabctlError:
         return CANNOT_LEAVE_OUT
     if not errors:

@@ -22,8 +22,8 @@ from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.models.presets import Preset, preset_for
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.blas_threads import single_threaded
+from labctl.fitting.numeric.drift_noise import Noise
 from labctl.fitting.numeric.json_numbers import plain_list
-from labctl.fitting.numeric.least_squares import Solution
 from labctl.fitting.uncertainty.local_model_error import LocalModelError
 from labctl.fitting.uncertainty.repeatability import Repeatability, repeatability_of
 from labctl.recording import Recording
@@ -53,8 +53,8 @@ def left_variance(data: FitData, preset: Preset, prior: CoefficientPrior | None 
     by_temperature = data.folds
     if preset.inner_only:
         by_temperature = by_temperature[1:-1]
-    solutions = axis_solutions.solutions
-    outside = [_left_out(data, preset, masks, solutions, prior) for masks in (by_temperature, rate_folds(data))]
+    noise = axis_solutions.noise
+    outside = [_left_out(data, preset, masks, noise, prior) for masks in (by_temperature, rate_folds(data))]
     residual_var = {}
     for axis, values in inside.items():
         within = within_runs(data, values)
@@ -89,7 +89,7 @@ def rate_folds(data: FitData) -> list[NDArray[np.bool_]]:
 
 
 def _left_out(
-    data: FitData, preset: Preset, masks: list[NDArray[np.bool_]], solutions: Mapping[str, Solution],
+    data: FitData, preset: Preset, masks: list[NDArray[np.bool_]], noise: Mapping[str, Noise],
     prior: CoefficientPrior | None,
 ) -> dict[str, Array]:  # fmt: skip
     """Return axis -> (m,) residuals of each data set by the fit without its fold, NaN where there is none."""
@@ -102,7 +102,7 @@ def _left_out(
             model, rows = preset.build(data_used)
             if prior is None:
                 require_enough_data(data_used.take(rows), model)
-            solved = solve_axes(data_used.take(rows), model, solutions, prior)
+            solved = solve_axes(data_used.take(rows), model, noise, prior)
             without = residuals(FittedModel(model, solved.fits), data.take(mask), solved.nuisance)
         except LabctlError:  # too little is left, or a law that cannot be inverted: this fold says nothing
             continue

@@ -9,7 +9,7 @@ from labctl.fitting.criticism.criticism import LARGE_DRIFT
 from labctl.fitting.data.noise_floor import correlation_times
 from labctl.fitting.numeric.drift_noise import Drift, Scatter, grid, hidden
 from labctl.fitting.numeric.drift_whitening import MAX_FACTORED, whitened
-from labctl.fitting.numeric.least_squares import drift_beside
+from labctl.fitting.numeric.least_squares import drift_beside, solve
 from studies.drift_shapes import SCHEDULES, TRUTHS, share_inside
 
 DRIFTS = [
@@ -91,3 +91,31 @@ def test_no_drift_is_longer_than_a_powered_run() -> None:
     known = Scatter(np.asarray(t_s, dtype=np.float64), run, np.zeros(60), np.full(60, 1e-6), 2e-3)
     assert {drift.tau_s for drift in (*grid(known, 1e-3), *hidden(known, 1e-3)) if drift.shortest_tau_s} == {29 * 60.0}
     assert max(drift.tau_s for drift in hidden(known, 1e-3)) <= 200 * 60.0
+
+
+@pytest.mark.parametrize("knows_white", [True, False])
+def test_a_fit_at_the_noise_of_another_does_not_depend_on_the_unit_of_the_output(knows_white: bool) -> None:
+    """Means without a scatter have weights in units of their white noise, and the drift that they show has deg/s."""
+    rng = np.random.default_rng(8)
+    m, tau_s = 120, 2000.0
+    t_s = 60.0 * np.arange(float(m))
+    walk = np.linalg.cholesky(np.exp(-np.abs(t_s[:, None] - t_s) / tau_s) + 1e-9 * np.eye(m)) @ rng.normal(size=m)
+    y = 0.02 + 0.005 * walk + rng.normal(0.0, 0.001, m)
+    design = np.column_stack([np.ones(m), t_s / t_s[-1]])
+    found = []
+    for size in (1.0, 1000.0):
+        white = np.full(m, (0.001 * size) ** 2) if knows_white else None
+        stability = 0.01 * size
+        every = Scatter(t_s, np.ones(m, dtype=np.int64), np.zeros(m), white, stability)
+        noise = solve(design, size * y, every).noise
+        half = Scatter(t_s[: m // 2], every.run[: m // 2], every.rate_dps[: m // 2],
+                       None if white is None else white[: m // 2], stability)  # fmt: skip
+        assert noise.drift.drift_dps == pytest.approx(0.005 * size, rel=0.5)
+        found.append(solve(design[: m // 2], size * y[: m // 2], half, noise.drift_beside(half)).values / size)
+    assert found[0] == pytest.approx(found[1], rel=1e-6)
+    ratio = np.eye(m // 2) * 0.001**2 + 0.005**2 * np.exp(-np.abs(t_s[: m // 2, None] - t_s[: m // 2]) / tau_s)
+    weight = np.linalg.inv(ratio)
+    part = design[: m // 2]
+    expected = np.linalg.solve(part.T @ weight @ part, part.T @ weight @ y[: m // 2])
+    plain, *_ = np.linalg.lstsq(part, y[: m // 2], rcond=None)
+    assert np.abs(found[0] - expected).max() < 0.5 * np.abs(plain - expected).max()

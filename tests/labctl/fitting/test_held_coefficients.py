@@ -19,8 +19,7 @@ from labctl.fitting.estimation.held import Fixed
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.models.held import Held, HeldCoefficient
-from labctl.fitting.numeric.drift_noise import Drift
-from labctl.fitting.numeric.least_squares import Solution
+from labctl.fitting.numeric.drift_noise import NO_DRIFT, Drift, Noise
 from labctl.fitting.uncertainty import evidence_of, rate_uncertainty
 from labctl.fitting.uncertainty.sensitivity import correction_gain, error_at, response, u_of_fit
 from labctl.recording import Recording, RecordingInfo
@@ -77,8 +76,7 @@ def test_beside_a_drift_they_are_those_of_generalised_least_squares() -> None:
     data = fit_data_of(replace(recording, columns=columns))
     held = Held({"z": {"scale_factor": HeldCoefficient((4e-3,), (2e-5,), "1", "scale_factor")}})
     model = ErrorModel("m", (parse_term("bias"), parse_term("scale_factor")), held=held)
-    known = Solution(np.zeros(0), np.zeros((0, 0)), np.zeros(0), None, drift, 1.0)
-    solved = solve_axes(data, model, {"z": known})
+    solved = solve_axes(data, model, {"z": Noise(drift, std / np.sqrt(n))})
 
     t_s, rate = recording.columns["t_s"], recording.columns["table_rate_dps"]
     noise = drift.drift_dps**2 * np.exp(-np.abs(t_s[:, None] - t_s) / drift.tau_s) + np.eye(20) * std**2 / n
@@ -103,7 +101,6 @@ def test_fitted_coefficients_and_corrected_rates_are_within_u_as_often_as_they_s
     inside: dict[str, list[bool]] = {"bias": [], "asymmetry": [], "rate": []}
     terms = tuple(map(parse_term, ("bias", "scale_factor", "scale_factor_asymmetry")))
     error = truth["bias"] + truth["scale_factor"] * rate + truth["asymmetry"] * np.abs(rate)
-    without_drift = Solution(np.zeros(0), np.zeros((0, 0)), np.zeros(0), None, Drift(0.0, 1.0), 1.0)
     recording = points(rate, np.full(len(rate), 25.0), rate)
     columns = recording.columns | {"gyro_z_std": np.full(len(rate), 1e-2), "n": np.full(len(rate), 100)}
     data = fit_data_of(replace(recording, columns=columns))
@@ -111,7 +108,7 @@ def test_fitted_coefficients_and_corrected_rates_are_within_u_as_often_as_they_s
         output = rate + error + rng.normal(0, 1e-3, len(rate))
         given = HeldCoefficient((truth["scale_factor"] + rng.normal(0, u),), (u,), "1", "scale_factor")
         model = ErrorModel("m", terms, held=Held({"z": {"scale_factor": given}}))
-        solved = solve_axes(replace(data, outputs={"z": output}), model, {"z": without_drift})
+        solved = solve_axes(replace(data, outputs={"z": output}), model, {"z": NO_DRIFT})
         fitted = FittedModel(model, solved.fits)
         axis = fitted.axes["z"]
         for name in ("bias", "asymmetry"):

@@ -7,24 +7,23 @@ import pytest
 from scipy.stats import t as student
 
 from labctl.fitting.numeric.drift_noise import Drift, Scatter
-from labctl.fitting.numeric.least_squares import solve
+from labctl.fitting.numeric.least_squares import Solution, solve
+from labctl.fitting.numeric.prior_rows import PriorRows
 from labctl.fitting.numeric.variance_components import FACTOR, RandomEffects, half_width
 
 
-def group_fit(offsets: list[float], noise: float = 1e-4, each: int = 40):
+def group_fit(offsets: list[float], noise: float = 1e-4, each: int = 40) -> Solution:
     """Return the fit of one mean to groups of values that are off by `offsets`, their spread a random effect."""
     groups, wide = len(offsets), 5.0
     rng = np.random.default_rng(4)
     member = np.repeat(np.eye(groups), each, axis=0)
     y = member @ np.array(offsets) + rng.normal(0, noise, groups * each)
-    design = np.vstack(
-        [np.column_stack([np.ones(len(y)), member]), np.column_stack([np.zeros(groups), np.eye(groups)])]
-    )
-    white = np.concatenate([np.full(len(y), noise**2), np.full(groups, wide**2)])
-    m = len(design)
-    scatter = Scatter(np.arange(float(m)), np.arange(m), np.zeros(m), white)
+    m = len(y)
+    design = np.column_stack([np.ones(m), member])
+    scatter = Scatter(np.arange(float(m)), np.arange(m), np.zeros(m), np.full(m, noise**2))
     random = RandomEffects(np.zeros(groups, dtype=np.int64), np.full(groups, wide))
-    return solve(design, np.concatenate([y, np.zeros(groups)]), scatter, Drift(0.0, 1.0), random)
+    prior = PriorRows.none(1).with_coefficients(np.full(groups, wide))
+    return solve(design, y, scatter, Drift(0.0, 1.0), random, prior=prior)
 
 
 @pytest.mark.parametrize("offsets", [[0.01, -0.02], [0.01, 0.02, -0.015], [0.01, -0.02, 0.005, 0.03, -0.01]])

@@ -16,7 +16,7 @@ from labctl.fitting.fleet.batched import batched_fit, batched_fit_of_each
 from labctl.fitting.fleet.refit import refit
 from labctl.fitting.models.held import Held, HeldCoefficient
 from labctl.fitting.models.presets import PRESETS
-from labctl.fitting.numeric.drift_noise import Drift, Scatter
+from labctl.fitting.numeric.drift_noise import Drift, Noise, Scatter
 from labctl.fitting.numeric.least_squares import solve
 from labctl.recording import Recording, RecordingInfo
 
@@ -98,10 +98,7 @@ def test_a_published_model_is_refitted_as_the_fit_of_one_unit_does_it(data: FitD
     rng = np.random.default_rng(3)
     outputs = {axis: np.vstack([v + rng.normal(0, 1e-3, len(v)), v]) for axis, v in data.outputs.items()}
     found = refit(data, model, outputs, drift)
-    free = solve_axes(data, model)
-    stated = {axis: type(s)(s.values, s.covariance, s.residual, None, drift[axis], 1.0)
-              for axis, s in free.solutions.items()}  # fmt: skip
-    alone = solve_axes(data, model, stated)
+    alone = solve_axes(data, model, {axis: Noise(each, 1.0) for axis, each in drift.items()})
     for axis, fit in alone.fits.items():
         assert found[axis].fit.values[1] == pytest.approx(fit.values.ravel(), rel=1e-10)
         assert found[axis].fit.u[1] == pytest.approx(fit.u.ravel(), rel=1e-10)
