@@ -160,7 +160,7 @@ def _converged(
 ) -> tuple[AxisDesign, Solution, TimeErrors | None]:
     """Return the design at the solution, the solution, and the errors of the reference's time that are in it.
 
-    Laws are solved by Gauss-Newton steps at one drift, then once more. A delay and a bandwidth are laws of their own
+    Laws are solved by Gauss-Newton steps at one noise, and their uncertainty is averaged over the noise. A delay and a bandwidth are laws of their own
     effect, and every other effect sees the rate that comes through both.
     """
     response = first_response(data, model, axis)
@@ -179,9 +179,12 @@ def _converged(
         if np.allclose(solution.values, before, rtol=1e-7, atol=1e-14):
             break
     late = time_errors(data, axis)
-    if design.laws or late is not None:
-        solution = _solve_axis(data, model, axis, design, noise, late, prior)
-    return design, solution, late
+    if not design.laws and late is None:
+        return design, solution, late
+    averaged = _solve_axis(data, model, axis, design, noise, late, prior)
+    if design.laws:  # an average over the noise leaves a law along its tangent, which may be far from it
+        averaged = replace(averaged, values=solution.values, residual=solution.residual)
+    return design, averaged, late
 
 
 def _law_coefficients(design: AxisDesign, solution: Solution) -> dict[str, NDArray[np.float64]]:

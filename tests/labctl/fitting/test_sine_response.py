@@ -12,14 +12,18 @@ import pytest
 from labctl.fitting import FittedModel, fit
 from labctl.fitting.criticism import criticise
 from labctl.fitting.data.channels import Channels
-from labctl.fitting.effects import Term
+from labctl.fitting.data.fit_data import fit_data_of
+from labctl.fitting.effects import Term, parse_term
+from labctl.fitting.estimation.fit import fit_preset
 from labctl.fitting.estimation.result import FitResult
 from labctl.fitting.models.correction import correction
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.fitted_model import AxisFit
+from labctl.fitting.models.presets import changed
 from labctl.fitting.models.sine_form import sine_form_of
 from labctl.fitting.numeric.open_loop_sine import sine_ratio, sine_ratio_slope
-from labctl.recording import Recording
+from labctl.recording import Recording, read_recording
+from tests.helpers.paths import ROOT
 from tests.helpers.recordings import points
 
 EFFECTS = ["bias", "scale_factor", "sine_response"]
@@ -149,3 +153,14 @@ def test_every_axis_has_its_own_constant(triaxial: Callable[[int], Any]) -> None
     for axis, k in zip("xyz", (0.05, 0.1, 0.15), strict=True):
         found = k_of(result, axis)
         assert abs(found["value"][0] - k) < 4 * found["u"][0]
+
+
+@pytest.mark.parametrize("effect", ["scale_factor_odd", "scale_factor_odd:5", "scale_factor_asymmetry"])
+def test_a_law_beside_which_another_effect_is_hardly_seen_leaves_no_more_than_alone(effect: str) -> None:
+    """Its tangent leads far away, and an average of coefficients over the noise does not lie on the law."""
+    gyro = read_recording(ROOT / "labctl" / "examples" / "osu-fog")
+    alone = fit(gyro, effects=["bias_temperature", "scale_factor_temperature", *EFFECTS])
+    beside = fit_preset(fit_data_of(gyro), changed(alone.fitted.model, (parse_term(effect),)))
+    assert beside.error.rms_dps is not None
+    assert alone.error.rms_dps is not None
+    assert 0.045 < beside.error.rms_dps < alone.error.rms_dps == pytest.approx(0.0481, abs=5e-5)
