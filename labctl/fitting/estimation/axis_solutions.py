@@ -160,8 +160,8 @@ def _converged(
 ) -> tuple[AxisDesign, Solution, TimeErrors | None]:
     """Return the design at the solution, the solution, and the errors of the reference's time that are in it.
 
-    Laws are solved by Gauss-Newton steps at one noise, and their uncertainty is averaged over the noise. A delay and a bandwidth are laws of their own
-    effect, and every other effect sees the rate that comes through both.
+    Laws are solved by Gauss-Newton steps at one noise, and their uncertainty is averaged over the noise. A delay and a
+    bandwidth are laws of their own effect, and every other effect sees the rate that comes through both.
     """
     response = first_response(data, model, axis)
     data = data.through(response)

@@ -155,6 +155,7 @@ def test_every_axis_has_its_own_constant(triaxial: Callable[[int], Any]) -> None
         assert abs(found["value"][0] - k) < 4 * found["u"][0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effect", ["scale_factor_odd", "scale_factor_odd:5", "scale_factor_asymmetry"])
 def test_a_law_beside_which_another_effect_is_hardly_seen_leaves_no_more_than_alone(effect: str) -> None:
     """Its tangent leads far away, and an average of coefficients over the noise does not lie on the law."""
