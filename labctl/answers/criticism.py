@@ -211,7 +211,7 @@ class Undistinguished(TypedDict):
     """An effect of the model that the data could not tell from others."""
 
     effect: str
-    """Id of an effect that the version has and its parent has not."""
+    """Id of an effect that the version has, and one of the five versions before it has not."""
     others: list[str]
     """Ids of the effects that would explain the data as well in its place."""
 

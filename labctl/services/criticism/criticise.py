@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from labctl.fitting.effects import Formula
 
 A = TypeVar("A", bound=ResponseModel)
+
+#: Versions before one that are asked what its effects could not be distinguished from.
+LOOKED_BACK = 5
 
 
 def criticise_unit(
@@ -66,11 +69,11 @@ def _with_causes_not_known(
     answer: CriticismResponse, store: Store, row: CalibrationRecord, measured: tuple[RecordingRow, ...]
 ) -> CriticismResponse:
     """Return an answer that says, behind the verdict, of which parts of its model the cause is not known."""
-    undistinguished = _undistinguished(store, row, measured)
+    found = list(_undistinguished(store, row, measured))
     sentences = [
         f"These data do not show that the cause is {each['effect']}, which version {row.version} contains: "
-        f"{' or '.join(each['others'])} would explain them as well (criticism of version {row.parent})."
-        for each in undistinguished
+        f"{' or '.join(each['others'])} would explain them as well (criticism of version {before})."
+        for each, before in found
     ] + [
         f"The formula {term['effect']} of version {row.version} describes the error; it names no cause."
         for term in row.answer["model"].get("terms", ())
@@ -79,34 +82,52 @@ def _with_causes_not_known(
     place = len(answer.warnings) + 1
     return answer.model_copy(
         update={
-            "undistinguished": undistinguished, "cause_not_known": sentences,
+            "undistinguished": [each for each, _ in found], "cause_not_known": sentences,
             "text": [*answer.text[:place], *sentences, *answer.text[place:]],
         }
     )  # fmt: skip
 
 
-def _undistinguished(store: Store, row: CalibrationRecord, measured: tuple[RecordingRow, ...]) -> list[Undistinguished]:
-    """Return which effects that a version adds to the one before these data could not tell from others.
+def _undistinguished(
+    store: Store, row: CalibrationRecord, measured: tuple[RecordingRow, ...]
+) -> Iterator[tuple[Undistinguished, int]]:
+    """Yield which effects of a version these data could not tell from others, with the version that lacks them.
 
     Beside an effect that was added, what explains the same looks like noise: only the version before shows it.
     """
-    if row.parent is None:
-        return []
-    try:
-        before = version_of(store, row.serial, row.parent)
-        earlier = _cached_criticism(CriticismResponse, store, before, measured, ())
-    except LabctlError:
-        return []  # the version before cannot be compared with these data
-    if earlier.verdict != "ambiguous":
-        return []
-    added = [each for each in row.answer["model"]["effects"] if each not in before.answer["model"]["effects"]]
-    groups = {suspect["effect"]: suspect["alias_group"] for suspect in earlier.suspects}
-    undistinguished: list[Undistinguished] = []
-    for effect in added:
-        others = [each for each in groups.get(effect, ()) if each in earlier.named and each not in added]
-        if effect in earlier.named and others:
-            undistinguished.append({"effect": effect, "others": others})
-    return undistinguished
+    effects = set(row.answer["model"]["effects"])
+    for before, added in _additions(store, row):
+        try:
+            earlier = _cached_criticism(CriticismResponse, store, before, measured, ())
+        except LabctlError:
+            continue  # the version before cannot be compared with these data
+        groups = {suspect["effect"]: suspect["alias_group"] for suspect in earlier.suspects}
+        for effect in added if earlier.verdict == "ambiguous" else ():
+            others = [each for each in groups.get(effect, ()) if each in earlier.named and each not in effects]
+            if effect in earlier.named and others:
+                yield {"effect": effect, "others": others}, before.version
+
+
+def _additions(store: Store, row: CalibrationRecord) -> Iterator[tuple[CalibrationRecord, list[str]]]:
+    """Yield the versions that a version was made from, the newest first, and which of its effects each lacked first.
+
+    Of a long line only the newest are yielded: to criticise each takes seconds.
+    """
+    missing = set(row.answer["model"]["effects"])
+    child = row
+    for _ in range(LOOKED_BACK):
+        if child.parent is None:
+            return
+        try:
+            before = version_of(store, row.serial, child.parent)
+        except LabctlError:
+            return
+        had = set(before.answer["model"]["effects"])
+        added = [each for each in child.answer["model"]["effects"] if each in missing - had]
+        missing &= had
+        if added:
+            yield before, added
+        child = before
 
 
 def residuals_unit(

@@ -6,14 +6,18 @@ import json
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from labctl.answers.calibrations import FitRequest, ImproveRequest
 from labctl.answers.certification import CertificationResponse, CertifyRequest
 from labctl.calibration import read_calibration
-from labctl.errors import LabctlError
+from labctl.errors import LabctlError, NotEnoughData
 from labctl.fitting.effects import CATALOGUE
+from labctl.fitting.numeric.least_squares import Solution, solve
 from labctl.recording import read_recording
 from labctl.services.calibrations.assessment import assess
 from labctl.services.calibrations.certification import certify
@@ -68,10 +72,18 @@ def test_a_size_that_is_not_usual_is_said_beside_one_that_is(store: Store) -> No
 
 
 @pytest.mark.slow
-def test_a_suspect_that_cannot_be_fitted_beside_the_model_says_why(store: Store) -> None:
+def test_a_suspect_that_cannot_be_fitted_beside_the_model_says_why(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused_beside(design: NDArray[np.float64], *others: Any) -> Solution:
+        if design.shape[1] == 9:  # the sine and two odd orders, beside three of the bias and three of the scale factor
+            raise NotEnoughData("695 data sets determine only 8 of the 9 coefficients; leave effects out")
+        return solve(design, *others)
+
+    monkeypatch.setattr("labctl.fitting.estimation.axis_solutions.solve", refused_beside)
     answer = criticise_unit(store, GYRO, 2, None)
     refused = {suspect["effect"]: suspect["fit_refused"] for suspect in answer.suspects if suspect["fit_refused"]}
-    assert refused
+    assert "scale_factor_odd" in refused
     for effect, why in refused.items():
         with pytest.raises(LabctlError) as raised:
             improve_unit(store, GYRO, ImproveRequest(add=[effect], version=2), AT)
@@ -108,9 +120,20 @@ def test_a_formula_is_said_to_name_no_cause_behind_the_verdict_and_the_warnings(
     improve_unit(store, GYRO, ImproveRequest(add=[], formula=[formula], version=2), AT)
     answer = criticise_unit(store, GYRO, 3, None)
     assert answer.verdict == "adequate"
-    said = "The formula bend of version 3 describes the error; it names no cause."
-    assert answer.cause_not_known == [said]
-    assert answer.text[len(answer.warnings) + 1] == said
+    (of_the_version_before,) = criticise_unit(store, GYRO, 2, None).cause_not_known
+    assert answer.cause_not_known == [
+        of_the_version_before.replace("version 2", "version 3"),
+        "The formula bend of version 3 describes the error; it names no cause.",
+    ]
+    place = len(answer.warnings) + 1
+    assert answer.text[place : place + 2] == answer.cause_not_known
+
+
+@pytest.mark.slow
+def test_a_version_whose_effect_was_taken_out_again_is_asked_nothing(store: Store) -> None:
+    improve_unit(store, GYRO, ImproveRequest(remove=["sine_response"], add=["scale_factor_odd"], version=2), AT)
+    answer = criticise_unit(store, GYRO, 3, None)
+    assert "sine_response" not in {each["effect"] for each in answer.undistinguished}
 
 
 @pytest.mark.slow
