@@ -16543,7 +16543,7 @@ export interface components {
         Undistinguished: {
             /**
              * Effect
-             * @description Id of an effect that the version has and its parent has not.
+             * @description Id of an effect that the version has, and one of the five versions before it has not.
              */
             effect: string;
             /**
