@@ -2,13 +2,12 @@
 
 A real gyro (points), a campaign on one axis and a recording of three axes (readings). The pages show what their
 answers over HTTP say, which browser tests compare; here these answers are compared with what
-`studies.page_figures_recomputed`, `_refit`, `_formulas`, `_allan` and `_budget` compute.
+`studies.page_figures_recomputed`, `_refit`, `_surface`, `_formulas`, `_allan` and `_budget` compute.
 
-Taken from the answers, and so not recomputed: the drift in the noise floor (it is estimated beside a surface of many
-terms), the direction of north, the bins of the picture of an inspection, and the lines `model` and `repeatability` of a
-budget where they are not from a data sheet. Not compared at all: the evidence for effects and the odds, the test of the
-lack of fit, bounds of N, B and K and what an Allan deviation shows beside white noise, U about any axis, and U of a
-campaign that stops when it is enough.
+Taken from the answers, and so not recomputed: the direction of north, the bins of the picture of an inspection, and the
+lines `model` and `repeatability` of a budget where they are not from a data sheet. Not compared: the evidence for
+effects and the odds, the test of the lack of fit, bounds of N, B and K and what an Allan deviation shows beside white
+noise, U about any axis, and U of a campaign that stops when it is enough.
 """
 
 from __future__ import annotations

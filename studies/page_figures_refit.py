@@ -78,16 +78,6 @@ def _runs(values: Array, width: Callable[[float], float]) -> Array:
     return found
 
 
-def near_repeats(residual: Array, table_rate_dps: Array, temperature_c: Array, position: Array) -> float:
-    """Return the standard deviation of one data set by neighbours of nearly equal rate and temperature."""
-    same = 1e-3 * np.abs(table_rate_dps).max()
-    order = np.lexsort((temperature_c, np.round(table_rate_dps / same)))
-    near = (np.abs(np.diff(table_rate_dps[order])) <= same) & (np.diff(temperature_c[order]) <= SAME_TEMPERATURE_C)
-    near &= np.abs(np.diff(temperature_c[order])) <= SAME_TEMPERATURE_C
-    near &= position[order][1:] == position[order][:-1]
-    return float(np.sqrt(np.mean(np.diff(residual[order])[near] ** 2) / 2))
-
-
 @dataclass(frozen=True)
 class Drift:
     """Size, time constants of equal parts, and noise for each deg/s of the table."""
@@ -207,23 +197,26 @@ def _turning(columns: Array, means: Means) -> Array:
     return np.arange(columns.shape[1] - 4, columns.shape[1]) if means.turning_var else np.arange(0)
 
 
-def over_drifts(columns: Array, values: Array, means: Means) -> list[Fit]:
-    """Return the fit at each drift of the grid; with noise that grows with the rate where it is clearly likelier."""
+def over_drifts(columns: Array, values: Array, means: Means, *, only_shown: bool = False) -> list[Fit]:
+    """Return the fit at each drift of the grid; with noise that grows with the rate where it is clearly likelier.
+
+    `only_shown` is without the slow drifts that the scatter between data sets does not show, as of a noise floor.
+    """
     unexplained = _unexplained_dps(weighted(columns, values, means, Drift(0.0, (1.0,))), columns, values, means)
-    fits = _over_grid(columns, values, means, unexplained, 0.0)
+
+    def at(per_rate: float) -> list[Fit]:
+        drifts = [each for each in means.grid(unexplained, per_rate) if each.is_shown or not only_shown]
+        modes = {taus: means.modes(taus, per_rate) for taus in {drift.taus_s for drift in drifts}}
+        return [weighted(columns, values, means, drift, modes[drift.taus_s]) for drift in drifts]
+
+    fits = at(0.0)
     best = max(fits, key=lambda fit: fit.log_likelihood)
     growing = _per_rate(best, means)
     if growing > 0:
-        more = _over_grid(columns, values, means, unexplained, growing)
+        more = at(growing)
         if max(fit.log_likelihood for fit in more) > best.log_likelihood + GROWTH_GAIN:
             return more
     return fits
-
-
-def _over_grid(columns: Array, values: Array, means: Means, unexplained_dps: float, per_rate: float) -> list[Fit]:
-    drifts = means.grid(unexplained_dps, per_rate)
-    modes = {taus: means.modes(taus, per_rate) for taus in {drift.taus_s for drift in drifts}}
-    return [weighted(columns, values, means, drift, modes[drift.taus_s]) for drift in drifts]
 
 
 def _unexplained_dps(first: Fit, columns: Array, values: Array, means: Means) -> float:
