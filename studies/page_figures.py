@@ -2,12 +2,12 @@
 
 A real gyro (points), a campaign on one axis and a recording of three axes (readings). The pages show what their
 answers over HTTP say, which browser tests compare; here these answers are compared with what
-`studies.page_figures_recomputed`, `_refit`, `_surface`, `_formulas`, `_allan` and `_budget` compute.
+`studies.page_figures_recomputed`, `_refit`, `_surface`, `_left`, `_formulas`, `_allan`, `_budget`
+and `_any_axis` compute.
 
-Taken from the answers, and so not recomputed: the direction of north, the bins of the picture of an inspection, and the
-lines `model` and `repeatability` of a budget where they are not from a data sheet. Not compared: the evidence for
-effects and the odds, the test of the lack of fit, bounds of N, B and K and what an Allan deviation shows beside white
-noise, U about any axis, and U of a campaign that stops when it is enough.
+Taken from the answers, and so not recomputed: the bins of the picture of an inspection. Not compared: the evidence for
+effects and the odds, the test of the lack of fit, what an Allan deviation shows beside white noise, and U of a campaign
+that stops when it is enough.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ from studies.page_figures_explore import explore_page
 from studies.page_figures_fit import fit_of_version
 from studies.page_figures_pages import Compared, Row, campaign_page, recording_page
 from studies.page_figures_unit import unit_page
+from studies.page_figures_use import use_page
 
 RECIPES = Path(procedures.recipe.__file__).parent / "recipes"
 #: Of the campaign: enough temperatures for a parabola, and readings for an Allan deviation.
@@ -80,7 +81,7 @@ def compared(client: TestClient, database: Path, serial: str, recording: int) ->
     asked = {"recording": recording, "model": "bias_scale"}
     made = client.post(f"/api/units/{serial}/calibrations", json=asked).raise_for_status().json()
     unit = Compared.of(get, database, serial, recording, made["version"])
-    rows = [*recording_page(unit), *explore_page(unit), *unit_page(unit), *fit_of_version(unit)]
+    rows = [*recording_page(unit), *explore_page(unit), *unit_page(unit), *fit_of_version(unit), *use_page(unit)]
     campaign = get(f"/api/recordings/{recording}")["campaign"]
     if campaign is not None:
         rows += campaign_page(unit, campaign)

@@ -10,14 +10,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from studies.page_figures_formulas import white_std
 from studies.page_figures_pages import SMALL_DIFFERENCE, Compared, Row, figure
-from studies.page_figures_recomputed import environment_of, stability_of, turning_size_of
-from studies.page_figures_refit import Means, Refit
+from studies.page_figures_recomputed import environment_of
+from studies.page_figures_refit import Refit
 from studies.page_figures_surface import Course, drift_of_floor, near_repeats, surface
 
-#: Of the standard uncertainty of a coefficient: the outputs differ by the rounding of the stored table rates.
-SHARE_OF_U = 1e-3
+#: Of the standard uncertainty of a coefficient: the outputs differ by the rounding of the stored table rates, which is
+#: 1e-7 of the noise.
+SHARE_OF_U = 1e-6
 #: Data sets without times are numbered by the fit without a temperature as if they followed each other.
 TIMES_CLOSED_UP = 1e-4
 #: A drift is averaged by likelihoods. Rates of 400 deg/s are stored with 12 digits, to 2e-10 deg/s or 1e-7 of noise,
@@ -27,19 +27,7 @@ OF_THE_LIKELIHOOD = 2e-5
 
 def fit_of_version(c: Compared) -> Iterator[Row]:
     """Yield coefficients and u of a version, its error at temperatures left out, and the noise of the means."""
-    answer, sets = c.get(c.path), c.sets
-    white = {axis: white_var(c, axis) for axis in c.law.axes}
-    has_turning = "once_per_turn_dps" in answer["environment"]
-    turning_var = turning_size_of(c.database, c.recording) ** 2 / 2 if has_turning else 0.0
-    times, run = (
-        sets.mean.get("t_s", np.arange(float(len(sets.number)))),
-        np.round(sets.mean.get("run", 0.0 * sets.number)),
-    )
-    means = {
-        axis: Means(times, run, sets.table_rate_dps, white[axis], stability_of(c.database, c.recording), turning_var)
-        for axis in c.law.axes
-    }
-    refit = Refit.of(c.law, sets, means)
+    answer, refit = c.get(c.path), c.refit
     for axis, (values, covariance) in refit.averaged.items():
         names = c.law.names[axis]
         u = np.sqrt(np.diag(covariance))[: len(names)]
@@ -50,14 +38,6 @@ def fit_of_version(c: Compared) -> Iterator[Row]:
                      SHARE_OF_U)  # fmt: skip
     yield from _left_out(c, refit)
     yield from _noise(c, refit)
-
-
-def white_var(c: Compared, axis: str) -> np.ndarray | None:
-    """Return the variance of each mean by the white noise of its readings, (n,); None: the readings are not known."""
-    if not c.sets.raw:
-        return None
-    parts = np.split(c.sets.raw[f"gyro_{axis}"], c.sets.begins[1:-1])
-    return np.array([white_std(part) for part in parts]) ** 2 / c.sets.readings
 
 
 def _left_out(c: Compared, refit: Refit) -> Iterator[Row]:

@@ -26,6 +26,8 @@ SIZES, HIDDEN_SIZES = (0.35, 0.6, 0.8, 1.0, 1.3, 1.7, 2.3, 3.2), (4.5, 6.5, 9.0)
 SPACINGS, SLOW, FLICKER_RATIO = (0.25, 3.0, 12.0, 50.0, 200.0), 0.05, 4.0
 #: Width of the prior of a size, a factor; largest drift over half the bias stability; that where none is stated, deg/s.
 PRIOR_FACTOR, LARGEST, USUAL_DPS = 2.5, 12.0, 0.004
+#: Groups of rates that are left out in turn.
+RATE_GROUPS = 11
 #: What noise that grows with the rate has to gain in log likelihood.
 GROWTH_GAIN = 3.0
 
@@ -220,13 +222,16 @@ def over_drifts(columns: Array, values: Array, means: Means, *, only_shown: bool
 
 
 def _unexplained_dps(first: Fit, columns: Array, values: Array, means: Means) -> float:
-    freedom = len(values) + len(_turning(columns, means)) - columns.shape[1]
+    turning = _turning(columns, means)
+    freedom = len(values) + len(turning) - columns.shape[1]
     largest = LARGEST * (means.stability_dps or USUAL_DPS) / 2 / max(SIZES)
     if means.white_var is None:
         return float(min(1.0, largest / np.sqrt(first.left @ first.left / freedom)))
-    prior = np.sum(first.values[_turning(columns, means)] ** 2) / means.turning_var if means.turning_var else 0.0
-    excess = (np.sum(first.left**2 / means.white_var) + prior) / freedom - 1
-    return float(min(np.sqrt(max(excess, 0.01) / np.mean(1 / means.white_var)), largest))
+    # what states the size of a once-per-turn amplitude is a row like that of a data set
+    left = np.concatenate([first.left, first.values[turning]])
+    variance = np.concatenate([means.white_var, np.full(len(turning), means.turning_var)])
+    excess = np.sum(left**2 / variance) / freedom - 1
+    return float(min(np.sqrt(max(excess, 0.01) / np.mean(1 / variance)), largest))
 
 
 def _per_rate(best: Fit, means: Means) -> float:
@@ -299,19 +304,41 @@ class Refit:
         """What the fit leaves of the outputs, axis -> (n,)."""
         return {axis: self.errors_dps[axis] - self.columns[axis] @ self.averaged[axis][0] for axis in self.law.axes}
 
+    @cached_property
+    def inside_dps(self) -> Array:
+        """Corrected less true rates of the fit itself, (n, axes)."""
+        return self._error_dps({axis: values for axis, (values, _) in self.averaged.items()})
+
+    @cached_property
+    def outside_temperature_dps(self) -> Array | None:
+        """The same of each data set by a fit without its temperature; None where what is left is not enough."""
+        parts = parts_left_out(self.sets.temperature_c)
+        return self._outside(parts) if len(parts) - 1 > self.law.temperature_degree else None
+
+    @cached_property
+    def outside_rate_dps(self) -> Array:
+        """The same without its rate: at most eleven groups of neighbouring rates are left out in turn."""
+        rates = np.round(self.sets.table_rate_dps, 3)
+        levels = np.unique(rates)
+        groups = np.array_split(levels, min(len(levels), RATE_GROUPS))
+        return self._outside([np.isin(rates, group) for group in groups])
+
     def rms_left_out(self) -> float | None:
         """Return the RMS error at temperatures left out in turn, deg/s; None where what is left is not enough."""
-        squares, parts = [], parts_left_out(self.sets.temperature_c)
-        if len(parts) - 1 <= self.law.temperature_degree:
-            return None
+        outside = self.outside_temperature_dps
+        return None if outside is None else float(np.sqrt(np.mean(outside**2)))
+
+    def _outside(self, parts: Sequence[Array]) -> Array:
+        """Return the errors of the data sets of each part by a fit to the others, at the drift of the fit to all."""
+        outside = np.empty((len(self.sets.number), len(self.law.axes)))
         for part in parts:
             found = {}
             for axis, fits in self.fits.items():
                 columns = self.columns[axis][~part]
                 means, values = self.means[axis].of(~part), self.errors_dps[axis][~part]
                 found[axis] = weighted(columns, values, means, drift_of(fits)).values
-            squares.append(self._error_dps(found)[part].ravel() ** 2)
-        return float(np.sqrt(np.mean(np.concatenate(squares))))
+            outside[part] = self._error_dps(found)[part]
+        return outside
 
     def _error_dps(self, found: Mapping[str, Array]) -> Array:
         """Return corrected less true rates, (n, axes), by coefficients; the waves are taken off the outputs first."""

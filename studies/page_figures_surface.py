@@ -139,7 +139,8 @@ def _blocks(sets: Sets, axis: str, course: Course | None) -> Iterator[Array]:
 
 def _history(sets: Sets, course: Course, warm: list[Array], rate: Array) -> Iterator[Array]:
     """Yield the direction in which the temperature went, lags and hystereses, functions of the time since power-on."""
-    t_s = sets.mean["t_s"]
+    t_s = sets.t_s
+    assert t_s is not None
     order = np.argsort(t_s, kind="stable")
     steps = np.diff(warm[1][order], prepend=warm[1][order[0]])
     sign = np.where(np.abs(steps) > STEP, np.sign(steps), 0.0)

@@ -27,7 +27,7 @@ KINDS = {
         "standard deviation of a data set", "begin and end of a data set", "readings of a data set", "trace over all",
         "time of a trace over all", "trace within a data set", "time of a trace within a data set",
         "picture of the inspection", "Allan deviation", "which readings share a bin", "interval of an Allan deviation",
-        "fitted curve of an Allan deviation", "angle random walk and its u, deg/sqrt(h)",
+        "fitted curve of an Allan deviation", "angle random walk and its u, deg/sqrt(h)", "bounds of N, B and K",
     },
     "explore": {
         "rate and temperature of a point", "measured error", "residual without refitting", "modelled error",
@@ -43,7 +43,7 @@ KINDS = {
         "u of the coefficients in use", "contributions in use", "combined and expanded uncertainty",
         "bias left by a version", "u of bias and scale factor left", "data sheet: bias", "data sheet: scale factor",
         "data sheet: scale factor asymmetry", "data sheet: scale factor nonlinearity", "data sheet: bias temperature",
-        "data sheet: scale factor temperature", "data sheet: angle random walk",
+        "data sheet: scale factor temperature", "data sheet: angle random walk", "data sheet: bounds of N, B and K",
         "data sheet: misalignment and orthogonality", "u of a reference standard",
         "sensitivity of a reference standard", "contribution of a reference standard",
         "repeatability by the data sheet",
@@ -55,6 +55,11 @@ KINDS = {
         "noise in proportion to the rate", "longest time constant of the drift", "drift over that of the data sheet",
         "noise floor", "noise floor by near repeats",
     },
+    "use": {
+        "calibrated temperatures", "calibrated rates", "model in use", "repeatability between runs",
+        "degrees of freedom between runs", "reach of U about any axis", "U about any axis",
+        "U about any axis, up to a rotation",
+    },
     "campaign": {
         "samples of the course", "course of a campaign", "begin and end of a step", "channels of a campaign",
     },
@@ -65,7 +70,9 @@ ALONE = {
     "pathlib", "sqlite3", "struct", "typing",
 }  # fmt: skip
 #: What recomputes the figures.
-RECOMPUTING = {f"page_figures_{each}" for each in ("allan", "budget", "formulas", "recomputed", "refit", "surface")}
+RECOMPUTING = {f"page_figures_{each}" for each in (
+    "allan", "any_axis", "budget", "formulas", "left", "recomputed", "refit", "surface",
+)}  # fmt: skip
 
 
 @pytest.fixture(scope="module")
