@@ -10,11 +10,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from studies.page_figures_lack import Reduced, chance_above, lack_of_fit
 from studies.page_figures_pages import SMALL_DIFFERENCE, Compared, Row, figure
-from studies.page_figures_recomputed import environment_of
+from studies.page_figures_recomputed import environment_of, stability_of, turning_size_of
 from studies.page_figures_refit import Refit
 from studies.page_figures_surface import Course, drift_of_floor, near_repeats, surface
 
+#: Of chi2: rates are stored to 1e-7 of the noise, and each of its terms is twice as much off.
+OF_CHI2 = 1e-6
 #: Of the standard uncertainty of a coefficient: the outputs differ by the rounding of the stored table rates, which is
 #: 1e-7 of the noise.
 SHARE_OF_U = 1e-6
@@ -38,6 +41,7 @@ def fit_of_version(c: Compared) -> Iterator[Row]:
                      SHARE_OF_U)  # fmt: skip
     yield from _left_out(c, refit)
     yield from _noise(c, refit)
+    yield from _lack_of_fit(c)
 
 
 def _left_out(c: Compared, refit: Refit) -> Iterator[Row]:
@@ -81,3 +85,17 @@ def _noise(c: Compared, refit: Refit) -> Iterator[Row]:
     floors = [each + drift[axis].size_dps ** 2 + (drift[axis].per_rate * c.sets.table_rate_dps) ** 2
               for axis, each in white.items()]  # fmt: skip
     yield figure("noise floor", [error["noise_floor_dps"]], [np.sqrt(np.mean(floors))], OF_THE_LIKELIHOOD)
+
+
+def _lack_of_fit(c: Compared) -> Iterator[Row]:
+    """Yield the test of the lack of fit of readings beside a model that is adequate, so that no effect is taken off."""
+    criticism = c.get(f"{c.path}/criticism")
+    if criticism["verdict"] != "adequate" or not c.sets.raw:
+        return
+    assert not criticism["readings_left_out"], "outliers are not written here"
+    stability = stability_of(c.database, c.recording)
+    assert stability is not None
+    chi2, freedom = lack_of_fit(Reduced(c.sets, c.law, turning_size_of(c.database, c.recording)), stability)
+    shown = criticism["lack_of_fit"]
+    yield figure("residual variance over that of noise and drift", [shown["statistic"]], [chi2 / freedom], OF_CHI2)
+    yield figure("chance that noise leaves as much", [shown["p_value"]], [chance_above(chi2, freedom)], OF_CHI2)

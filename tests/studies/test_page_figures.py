@@ -9,13 +9,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fastapi.testclient import TestClient
+from scipy.special import chdtrc, fdtrc
 
 from instruments.clock import VirtualClock
 from labctl.api.app import create_app
 from labctl.services.lab_service import LabService
 from labctl.store import open_store
 from studies.page_figures import units
+from studies.page_figures_any_axis import Part, normal_k
+from studies.page_figures_lack import chance_above
 from studies.page_figures_pages import Row, figure
+from studies.page_figures_surface import f_above
 
 #: No figure has fewer digits than this allows.
 LEAST_DIGITS = 1e-3
@@ -53,7 +57,8 @@ KINDS = {
         "coefficients by a refit, of their u", "u of coefficients by a refit, over another",
         "RMS error at temperatures left out", "white noise of a mean", "drift in the noise floor",
         "noise in proportion to the rate", "longest time constant of the drift", "drift over that of the data sheet",
-        "noise floor", "noise floor by near repeats",
+        "noise floor", "noise floor by near repeats", "residual variance over that of noise and drift",
+        "chance that noise leaves as much",
     },
     "use": {
         "calibrated temperatures", "calibrated rates", "model in use", "repeatability between runs",
@@ -71,7 +76,7 @@ ALONE = {
 }  # fmt: skip
 #: What recomputes the figures.
 RECOMPUTING = {f"page_figures_{each}" for each in (
-    "allan", "any_axis", "budget", "formulas", "left", "recomputed", "refit", "surface",
+    "allan", "any_axis", "budget", "formulas", "lack", "left", "recomputed", "refit", "surface",
 )}  # fmt: skip
 
 
@@ -102,6 +107,16 @@ def test_a_figure_that_is_wrong_or_missing_is_noticed() -> None:
     for shown in ([1.0], [1.0, None]):
         with pytest.raises(AssertionError, match="a: "):
             figure("a", shown, [1.0, 2.0])
+
+
+def test_distributions_that_are_written_by_series_are_those_of_scipy() -> None:
+    for chi2, freedom in ((3.0, 2), (1461.0, 1668), (1800.0, 1668), (5.0, 60)):
+        assert chance_above(chi2, freedom) == pytest.approx(chdtrc(freedom, chi2), rel=1e-9)
+    for ratio, above, below in ((1.3, 4, 38), (6.0, 5, 37), (0.2, 9, 12)):
+        assert f_above(ratio, above, below) == pytest.approx(fdtrc(above, below, ratio), rel=1e-6)
+    tilts = [Part((1.0, 1.0), "rectangular")]
+    for tilt, k in ((tilts, math.sqrt(6) * (1 - math.sqrt(1 - 0.9545))), ([Part((1.0,))], 2.0)):
+        assert normal_k([*tilt, Part((0.05,))]) == pytest.approx(k, abs=0.005)
 
 
 @pytest.mark.parametrize("module", sorted(RECOMPUTING))
