@@ -2,12 +2,12 @@
 
 A real gyro (points), a campaign on one axis and a recording of three axes (readings). The pages show what their
 answers over HTTP say, which browser tests compare; here these answers are compared with what
-`studies.page_figures_recomputed`, `_refit`, `_surface`, `_left`, `_lack`, `_formulas`, `_allan`,
-`_budget` and `_any_axis` compute.
+`studies.page_figures_recomputed`, `_refit`, `_surface`, `_left`, `_lack`, `_evidence`,
+`_formulas`, `_allan`, `_budget` and `_any_axis` compute.
 
-Taken from the answers, and so not recomputed: the bins of the picture of an inspection. Not compared: the evidence for
-effects and the odds, the test of the lack of fit where effects are missing, what an Allan deviation shows beside white
-noise, and U of a campaign that stops when it is enough.
+Taken from the answers, and so not recomputed: the bins of the picture of an inspection. Compared beside an adequate
+model alone: the test of the lack of fit, and the evidence for effects of a few shapes and the odds between them. Not
+compared: what an Allan deviation shows beside white noise, and U of a campaign that stops when it is enough.
 """
 
 from __future__ import annotations

@@ -10,7 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from studies.page_figures_lack import Reduced, chance_above, lack_of_fit
+from studies.page_figures_evidence import log_bayes_factor
+from studies.page_figures_lack import AxisNoise, Reduced, chance_above, lack_of_fit
 from studies.page_figures_pages import SMALL_DIFFERENCE, Compared, Row, figure
 from studies.page_figures_recomputed import environment_of, stability_of, turning_size_of
 from studies.page_figures_refit import Refit
@@ -18,6 +19,8 @@ from studies.page_figures_surface import Course, drift_of_floor, near_repeats, s
 
 #: Of chi2: rates are stored to 1e-7 of the noise, and each of its terms is twice as much off.
 OF_CHI2 = 1e-6
+#: Evidence is by normal equations with 1e-10 of their diagonal added: without it the same in 1e-8, with it to 2e-5 nats.
+OF_NATS = 5e-5
 #: Of the standard uncertainty of a coefficient: the outputs differ by the rounding of the stored table rates, which is
 #: 1e-7 of the noise.
 SHARE_OF_U = 1e-6
@@ -95,7 +98,15 @@ def _lack_of_fit(c: Compared) -> Iterator[Row]:
     assert not criticism["readings_left_out"], "outliers are not written here"
     stability = stability_of(c.database, c.recording)
     assert stability is not None
-    chi2, freedom = lack_of_fit(Reduced(c.sets, c.law, turning_size_of(c.database, c.recording)), stability)
+    reduced = Reduced(c.sets, c.law, turning_size_of(c.database, c.recording))
+    axes = [AxisNoise.of(reduced, axis, stability) for axis in c.law.axes]
+    chi2, freedom = lack_of_fit(axes)
     shown = criticism["lack_of_fit"]
     yield figure("residual variance over that of noise and drift", [shown["statistic"]], [chi2 / freedom], OF_CHI2)
     yield figure("chance that noise leaves as much", [shown["p_value"]], [chance_above(chi2, freedom)], OF_CHI2)
+    found = {each["effect"]: (each, log_bayes_factor(each["effect"], axes)) for each in criticism["suspects"]}
+    known = {effect: (each, own) for effect, (each, own) in found.items() if own is not None}
+    nats = [own for _, own in known.values()]
+    yield figure("evidence for an effect", [each["log_bayes_factor"] for each, _ in known.values()], nats, OF_NATS)
+    odds = np.array([each["probability"] for each, _ in known.values()])
+    yield figure("odds between two effects", odds / odds[0], np.exp(np.array(nats) - nats[0]), OF_NATS)

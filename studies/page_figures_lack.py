@@ -75,31 +75,31 @@ class Reduced:
     def _edges(self) -> Array:
         return np.linspace(0, self._count, NODES + 1).astype(int)[:-1]
 
-    def _at_nodes(self, channel: str) -> Array:
+    def at_nodes(self, channel: str) -> Array:
         """Return the means of a channel over the parts of each data set, (m, B)."""
         lengths = np.diff(np.append(self._edges, self._count))
         return np.add.reduceat(self._of(channel), self._edges, axis=1) / lengths
 
-    def _slow(self, values: Array) -> Array:
+    def slow(self, values: Array) -> Array:
         """Return the coordinates (R, m) of values at the nodes (m, B)."""
         return np.einsum("rmb,mb->rm", np.add.reduceat(self._basis[0], self._edges, axis=2), values)
 
     @cached_property
     def t_s(self) -> Array:
         """The time of each data set, (m,)."""
-        return self._at_nodes("t_s").mean(axis=1)
+        return self.at_nodes("t_s").mean(axis=1)
 
     def errors(self, axis: str) -> Array:
         """Return the coordinates (R, m) of output less true rate."""
         readings = np.einsum("rmn,mn->rm", self._basis[0], self._of(f"gyro_{axis}"))
-        return readings - self._slow(np.repeat(self.sets.own_rate_dps[axis][:, None], NODES, axis=1))
+        return readings - self.slow(np.repeat(self.sets.own_rate_dps[axis][:, None], NODES, axis=1))
 
     def base(self, axis: str) -> tuple[Array, Array]:
         """Return the columns (R, m, k) of the model and of the once-per-turn rate, and the precision of each (k,)."""
-        warm = self._at_nodes("temperature_c")
+        warm = self.at_nodes("temperature_c")
         rates = np.repeat(np.column_stack([self.sets.own_rate_dps[a] for a in self.law.axes]), NODES, axis=0)
         own = self.law.columns(axis, rates, warm.ravel()).reshape(*warm.shape, -1)
-        columns = [self._slow(own[:, :, k]) for k in range(own.shape[2])]
+        columns = [self.slow(own[:, :, k]) for k in range(own.shape[2])]
         angle = np.radians(self._of("table_angle_deg"))
         waves = [np.einsum("rmn,mn->rm", self._basis[0], wave(angle)) for wave in (np.cos, np.sin)]
         turning = [np.where(self.sets.position == up, wave, 0.0) for up in np.unique(self.sets.position)
@@ -119,27 +119,54 @@ class Reduced:
 
 @dataclass(frozen=True)
 class Fitted:
-    """What a fit of the base at one noise leaves: its restricted log likelihood with the prior, and chi2."""
+    """The base at one drift: its restricted log likelihood with the prior, chi2, and whitened columns (rows, k)."""
 
     log_p: float
     chi2: float
+    base: Array  #: orthonormal
+    y: Array  #: (rows,)
+    factor: Array  #: of the covariance of the means
 
 
-def lack_of_fit(reduced: Reduced, stability_dps: float) -> tuple[float, int]:
-    """Return chi2 over noise and drift of all outputs, and its degrees of freedom."""
-    chi2, freedom = 0.0, 0
-    for axis in reduced.law.axes:
+@dataclass(frozen=True)
+class AxisNoise:
+    """One output: its coordinates, the base, the scale of the coordinates (R, m), and the fit at each drift."""
+
+    reduced: Reduced
+    axis: str
+    scale: Array
+    fits: list[Fitted]
+
+    @staticmethod
+    def of(reduced: Reduced, axis: str, stability_dps: float) -> AxisNoise:
+        """Estimate the scatter of one output, and fit the base at each drift."""
         y, (base, precision) = reduced.errors(axis), reduced.base(axis)
         white = np.full(y.shape[1], reduced.white_var(axis))
         left = _left(y, base, precision, white)
         scale = _scales(left, reduced.present, np.sqrt(white))
-        means_var = white + _growing(left[0], reduced.sets, white)
-        drifts = _drifts(reduced, means_var, stability_dps)
+        drifts = _drifts(reduced, white + _growing(left[0], reduced.sets, white), stability_dps)
         fits = [_fit(y, base, precision, scale, reduced, covariance, prior) for covariance, prior in drifts]
-        best = max(fits, key=lambda each: each.log_p)
-        chi2 += best.chi2
-        freedom += int(reduced.present.sum()) - int((precision == 0).sum())
-    return chi2, freedom
+        return AxisNoise(reduced, axis, scale, fits)
+
+    @property
+    def best(self) -> Fitted:
+        """The fit at the likeliest drift."""
+        return max(self.fits, key=lambda each: each.log_p)
+
+    @property
+    def freedom(self) -> int:
+        """The degrees of freedom of chi2."""
+        return int(self.reduced.present.sum()) - int((self.reduced.base(self.axis)[1] == 0).sum())
+
+    def whitened(self, columns: Array, fit: Fitted) -> Array:
+        """Return columns (R, m, q) over the noise at a drift, (rows, q)."""
+        rows = _whitened(columns, self.scale, self.reduced.present, fit.factor)
+        return np.vstack([rows, np.zeros((len(fit.y) - len(rows), rows.shape[1]))])
+
+
+def lack_of_fit(axes: list[AxisNoise]) -> tuple[float, int]:
+    """Return chi2 over noise and drift of all outputs, and its degrees of freedom."""
+    return sum(each.best.chi2 for each in axes), sum(each.freedom for each in axes)
 
 
 def _drifts(reduced: Reduced, white_var: Array, stability_dps: float) -> Iterator[tuple[Array, float]]:
@@ -154,23 +181,26 @@ def _drifts(reduced: Reduced, white_var: Array, stability_dps: float) -> Iterato
             yield (factor * expected) ** 2 * together + np.diag(white_var), prior
 
 
+def _whitened(columns: Array, scale: Array, present: Array, factor: Array) -> Array:
+    """Return columns (R, m, q) with the means over their covariance, and the others over their scale, (rows, q)."""
+    others = columns[1:][present[1:]] / scale[1:][present[1:]][:, None]
+    return np.vstack([np.linalg.solve(factor, columns[0]), others])
+
+
 def _fit(
     y: Array, base: Array, precision: Array, scale: Array, reduced: Reduced, covariance: Array, prior: float
 ) -> Fitted:  # fmt: skip
     """Fit the base to all coordinates: the means by their covariance, the others by their scale."""
     factor = np.linalg.cholesky(covariance)
-    rows = np.column_stack([base[0], y[0]])
-    whitened = np.linalg.solve(factor, rows)
-    others = np.concatenate([base, y[:, :, None]], axis=2)[1:][reduced.present[1:]]
-    others = others / scale[1:][reduced.present[1:]][:, None]
+    rows = _whitened(np.concatenate([base, y[:, :, None]], axis=2), scale, reduced.present, factor)
     known = np.column_stack([np.diag(np.sqrt(precision)), np.zeros(len(precision))])[precision > 0]
-    whole = np.vstack([whitened, others, known])
+    whole = np.vstack([rows, known])
     size = np.linalg.norm(whole[:, :-1], axis=0)
     q, r = np.linalg.qr(whole[:, :-1] / size)
     left = whole[:, -1] - q @ (q.T @ whole[:, -1])
     chi2 = float(left @ left)
     logs = 2 * np.log(np.diag(factor)).sum() + 2 * np.log(np.abs(np.diag(r)) * size).sum()
-    return Fitted(-0.5 * (logs + chi2) + prior, chi2)
+    return Fitted(-0.5 * (logs + chi2) + prior, chi2, q, whole[:, -1], factor)
 
 
 def _left(y: Array, base: Array, precision: Array, white_var: Array) -> Array:

@@ -58,7 +58,7 @@ KINDS = {
         "RMS error at temperatures left out", "white noise of a mean", "drift in the noise floor",
         "noise in proportion to the rate", "longest time constant of the drift", "drift over that of the data sheet",
         "noise floor", "noise floor by near repeats", "residual variance over that of noise and drift",
-        "chance that noise leaves as much",
+        "chance that noise leaves as much", "evidence for an effect", "odds between two effects",
     },
     "use": {
         "calibrated temperatures", "calibrated rates", "model in use", "repeatability between runs",
@@ -76,7 +76,7 @@ ALONE = {
 }  # fmt: skip
 #: What recomputes the figures.
 RECOMPUTING = {f"page_figures_{each}" for each in (
-    "allan", "any_axis", "budget", "formulas", "lack", "left", "recomputed", "refit", "surface",
+    "allan", "any_axis", "budget", "evidence", "formulas", "lack", "left", "recomputed", "refit", "surface",
 )}  # fmt: skip
 
 
