@@ -80,19 +80,19 @@ class Unit:
         self, standard: Mapping[str, Any], k: int, rates_dps: Array, gain: Array, *, aligned: bool
     ) -> Part:  # fmt: skip
         """Return what a reference standard adds to one corrected rate."""
-        u, quantity = u_of(standard), standard["quantity"]
+        u, quantity, own = u_of(standard), standard["quantity"], "xyz".index(self.law.axes[k])
         distribution = "normal" if standard["half_width"] is None else standard["distribution"]
         sizes: tuple[float, ...]
         if quantity == "clock":
-            sizes = (1e-6 * rates_dps[k] * u,)
+            sizes = (1e-6 * rates_dps[own] * u,)
         elif quantity in CANCEL:
             sizes = (0.0,)
         elif quantity in ANGLES:
             small = math.radians(u)
-            others = [rates_dps[j] for j in range(3) if j != k]
+            others = [rates_dps[j] for j in range(3) if j != own]
             # of both mountings whose axes a rotation of the frame exchanges, the mean is left of a unit that is aligned
             across = [rate / 2 * small for rate in others for _ in range(2)] if aligned else [r * small for r in others]
-            sizes = (*across, math.sqrt(2) * abs(rates_dps[k]) * small**2)
+            sizes = (*across, math.sqrt(2) * abs(rates_dps[own]) * small**2)
         elif quantity == "level":
             sizes = (math.radians(self.horizontal_dps) * float(gain[k].sum()) * u,)
         else:

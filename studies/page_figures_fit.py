@@ -19,7 +19,7 @@ from studies.page_figures_surface import Course, drift_of_floor, near_repeats, s
 
 #: Of chi2: rates are stored to 1e-7 of the noise, and each of its terms is twice as much off.
 OF_CHI2 = 1e-6
-#: Evidence is by normal equations with 1e-10 of their diagonal added: without it the same in 1e-8, with it to 2e-5 nats.
+#: Evidence is by normal equations with 1e-10 of their diagonal added, which moves it by 2e-5 nats; else by 1e-8.
 OF_NATS = 5e-5
 #: Of the standard uncertainty of a coefficient: the outputs differ by the rounding of the stored table rates, which is
 #: 1e-7 of the noise.

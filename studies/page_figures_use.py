@@ -8,7 +8,6 @@ import numpy as np
 
 from studies.page_figures_any_axis import Unit
 from studies.page_figures_budget import of_datasheet
-from studies.page_figures_left import Left
 from studies.page_figures_pages import Compared, Row, figure
 from studies.page_figures_recomputed import info_of, turning_size_of
 
@@ -19,6 +18,8 @@ OF_A_REFIT = 1e-6
 FIVE_DIGITS_LESS_NOISE = 1e-4
 #: A coverage factor is stated with a further 2 % of u: half of the square of that, and what else it rounds.
 SMOOTHED_K = 2.5e-4
+#: Rates of the table are stored with so many: half a unit of the last one.
+TWELVE_DIGITS = 5e-12
 #: A calibration over less is of one temperature, K.
 ONE_TEMPERATURE_C = 1.0
 
@@ -30,7 +31,7 @@ def use_page(c: Compared) -> Iterator[Row]:
     rates = np.column_stack(list(c.sets.own_rate_dps.values()))
     limits_c, limits_dps = (warm.min(), warm.max()), (rates.min(), rates.max())
     yield figure("calibrated temperatures", validity["temperature_c"], limits_c)
-    yield figure("calibrated rates", validity["rate_dps"], limits_dps)
+    yield figure("calibrated rates", validity["rate_dps"], limits_dps, TWELVE_DIGITS)
     later = left.repeatability()
     middle_c = sum(limits_c) / 2
     for rate in (0.0, limits_dps[1] / 2, limits_dps[1]):
@@ -44,14 +45,15 @@ def use_page(c: Compared) -> Iterator[Row]:
                 said = lines["repeatability"]
                 yield figure("repeatability between runs", [said["u"]], later[:1], OF_A_REFIT)
                 yield figure("degrees of freedom between runs", [said["degrees_of_freedom"]], later[1:])
-    yield from _any_axis(c, left, limits_c, max(abs(each) for each in limits_dps))
+    yield from _any_axis(c, limits_c, max(abs(each) for each in limits_dps))
 
 
-def _any_axis(c: Compared, left: Left, limits_c: tuple[float, float], reach_dps: float) -> Iterator[Row]:
+def _any_axis(c: Compared, limits_c: tuple[float, float], reach_dps: float) -> Iterator[Row]:
     """Yield U about any axis; it is unknown where the unit was not turned about each axis, or with one power-on."""
     shown = c.get(f"{c.path}/uncertainty?rate_dps=0&temperature_c={limits_c[0]}")["any_axis"]
-    yield figure("reach of U about any axis", [each["reach_dps"] for each in shown.values()], [reach_dps] * len(shown))
-    unit = _unit(c, left) if len(c.law.axes) == len("xyz") else None
+    yield figure("reach of U about any axis", [each["reach_dps"] for each in shown.values()], [reach_dps] * len(shown),
+                 TWELVE_DIGITS)  # fmt: skip
+    unit = unit_in_use(c) if len(c.law.axes) == len("xyz") else None
     low, high = limits_c
     temperatures_c = [low, (low + high) / 2, high] if high - low >= ONE_TEMPERATURE_C else [(low + high) / 2]
     for name, aligned in (("bound_dps", False), ("aligned_bound_dps", True)):
@@ -60,10 +62,10 @@ def _any_axis(c: Compared, left: Left, limits_c: tuple[float, float], reach_dps:
                      [each[name] for each in shown.values()], [own[axis] for axis in shown], SMOOTHED_K)  # fmt: skip
 
 
-def _unit(c: Compared, left: Left) -> Unit:
+def unit_in_use(c: Compared) -> Unit:
     """Return what U of a rate vector follows from; a later power-on is as far off as runs were, or as a data sheet."""
-    info, later = info_of(c.database, c.recording), left.repeatability()
+    info, later = info_of(c.database, c.recording), c.left.repeatability()
     stated = (info[each]["bias_stability_dps"] for each in ("datasheet", "datasheet_conventions") if later is None)
     u_later, freedom = later or (of_datasheet(*stated), None)
     horizontal_dps = turning_size_of(c.database, c.recording)
-    return Unit(c.law, left, (u_later, freedom), info["standards"], horizontal_dps)
+    return Unit(c.law, c.left, (u_later, freedom), info["standards"], horizontal_dps)

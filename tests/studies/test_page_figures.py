@@ -65,6 +65,7 @@ KINDS = {
         "degrees of freedom between runs", "reach of U about any axis", "U about any axis",
         "U about any axis, up to a rotation",
     },
+    "stop": {"data sets of a campaign that ends early", "U of a campaign that ends early"},
     "campaign": {
         "samples of the course", "course of a campaign", "begin and end of a step", "channels of a campaign",
     },
@@ -87,7 +88,7 @@ def compared(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[Row]]:
 
 @pytest.mark.slow
 def test_figures_of_three_units_are_those_of_the_database(compared: dict[str, list[Row]]) -> None:
-    assert len(compared) == 3
+    assert len(compared) == 4
     for unit, rows in compared.items():
         for row in rows:
             assert row.n > 0, f"{unit}: {row.figure}"
