@@ -1,14 +1,13 @@
 """Figures of the pages of three units, and the same from the database by a script that shares no code with them.
 
-A real gyro (points), a campaign on one axis and a recording of three axes (readings). The pages show what their
-answers over HTTP say, which browser tests compare; here these answers are compared with what
-`studies.page_figures_recomputed`, `_refit`, `_formulas`, `_allan` and `_budget` compute.
+A real gyro (points), a campaign on one axis and a recording of three axes (readings); of a fourth, a campaign that ends
+when U is small enough, U at its end. The pages show what their answers over HTTP say, which browser tests compare; here
+these answers are compared with what `studies.page_figures_recomputed`, `_refit`, `_surface`, `_left`, `_lack`,
+`_evidence`, `_formulas`, `_allan`, `_budget` and `_any_axis` compute.
 
-Taken from the answers, and so not recomputed: the drift in the noise floor (it is estimated beside a surface of many
-terms), the direction of north, the bins of the picture of an inspection, and the lines `model` and `repeatability` of a
-budget where they are not from a data sheet. Not compared at all: the evidence for effects and the odds, the test of the
-lack of fit, bounds of N, B and K and what an Allan deviation shows beside white noise, U about any axis, and U of a
-campaign that stops when it is enough.
+Taken from the answers, and so not recomputed: the bins of the picture of an inspection. Compared beside an adequate
+model alone: the test of the lack of fit, and the evidence for effects of a few shapes and the odds between them. Not
+compared: what an Allan deviation shows beside white noise.
 """
 
 from __future__ import annotations
@@ -31,7 +30,9 @@ from labctl.store import open_store
 from studies.page_figures_explore import explore_page
 from studies.page_figures_fit import fit_of_version
 from studies.page_figures_pages import Compared, Row, campaign_page, recording_page
+from studies.page_figures_stop import stopped_campaign
 from studies.page_figures_unit import unit_page
+from studies.page_figures_use import use_page
 
 RECIPES = Path(procedures.recipe.__file__).parent / "recipes"
 #: Of the campaign: enough temperatures for a parabola, and readings for an Allan deviation.
@@ -70,6 +71,7 @@ def units(database: Path) -> Iterator[tuple[str, list[Row]]]:
         for head in client.get("/api/recordings").json():
             name = f"{head['serial']}, recording {head['id']} ({head['kind']})"
             yield name, compared(client, database, head["serial"], head["id"])
+    yield "a campaign that ends early", list(stopped_campaign(database.with_name("stopped.sqlite")))
 
 
 def compared(client: TestClient, database: Path, serial: str, recording: int) -> list[Row]:
@@ -81,13 +83,14 @@ def compared(client: TestClient, database: Path, serial: str, recording: int) ->
     asked = {"recording": recording, "model": "bias_scale"}
     made = client.post(f"/api/units/{serial}/calibrations", json=asked).raise_for_status().json()
     unit = Compared.of(get, database, serial, recording, made["version"])
-    rows = [*recording_page(unit), *explore_page(unit), *unit_page(unit), *fit_of_version(unit)]
+    rows = [*recording_page(unit), *explore_page(unit), *unit_page(unit), *fit_of_version(unit), *use_page(unit)]
     campaign = get(f"/api/recordings/{recording}")["campaign"]
     if campaign is not None:
         rows += campaign_page(unit, campaign)
+    known = [row for row in rows if row.n]  # what is unknown to both has no figure
     return [
-        together(name, [row for row in rows if row.figure == name])
-        for name in dict.fromkeys(row.figure for row in rows)
+        together(name, [row for row in known if row.figure == name])
+        for name in dict.fromkeys(row.figure for row in known)
     ]
 
 

@@ -16,6 +16,12 @@ Array = np.ndarray
 TOLERANCE, NEIGHBOURS = 0.02, 1.6
 PROBABILITY = 0.95
 ROUNDS = 100
+#: Chance with which a variance at one octave is below the truth by more than a bound allows.
+BOUND_CHANCE = 0.005
+#: Variances bend downwards by this many deviations only behind a filter or a vibration.
+BENDS = 3.0
+#: Of the variance at its own averaging time, a filter lets pass this share at least.
+PASSED = 0.5
 
 
 def freedom_of_white(readings: int, m: Array) -> Array:
@@ -29,6 +35,38 @@ def interval(deviation: Array, freedom: Array) -> tuple[Array, Array]:
     tail = (1 - PROBABILITY) / 2
     limits = [[math.sqrt(nu / _chi_square(nu, p)) for nu in freedom.tolist()] for p in (1 - tail, tail)]
     return deviation * np.array(limits[0]), deviation * np.array(limits[1])
+
+
+def freedom_of_flicker(readings: int, m: Array) -> Array:
+    """Return the same of flicker noise of the rate."""
+    n = readings + 1.0
+    longer = 5 * n**2 / (4 * m * (n + 3 * m))
+    return np.maximum(np.where(m == 1, 2 * (n - 2) ** 2 / (2.3 * n - 4.9), longer), 1.0)
+
+
+def freedom_of_walk(readings: int, m: Array) -> Array:
+    """Return the same of a random walk of the rate."""
+    n = readings + 1.0
+    return np.maximum((n - 2) / m * ((n - 1) ** 2 - 3 * m * (n - 1) + 4 * m**2) / (n - 3) ** 2, 1.0)
+
+
+def bounds(variance: Array, tau_s: Array, m: Array, readings: int) -> dict[str, float]:
+    """Return the largest N, B and K, in deg/s and s, that a record without coarse steps is compatible with."""
+    white = freedom_of_white(readings, m)
+    bend = np.diff(np.log(variance), 2)
+    deviation = np.sqrt(2 / white[2:] + 4 * 2 / white[1:-1] + 2 / white[:-2])
+    down = np.flatnonzero(bend < -BENDS * deviation)
+    used = slice(int(down[-1]) + 2 if len(down) else 0, None)
+    variance, tau_s, m = variance[used], tau_s[used], m[used]
+    passed = 1 - (1 - PASSED) * tau_s[0] / tau_s
+    shapes = {"N": 1 / tau_s, "B": np.full(len(tau_s), 2 * np.log(2) / np.pi), "K": tau_s / 3}
+    freedoms = {"N": freedom_of_white, "B": freedom_of_flicker, "K": freedom_of_walk}
+    return {
+        name: math.sqrt(min(v * nu / _chi_square(nu, BOUND_CHANCE) / (p * s) for v, nu, p, s in zip(
+            variance.tolist(), freedoms[name](readings, m).tolist(), passed.tolist(), shape.tolist(), strict=True
+        )))
+        for name, shape in shapes.items()
+    }  # fmt: skip
 
 
 def terms(variance: Array, tau_s: Array, m: Array, readings: int) -> tuple[Array, float, float]:

@@ -79,17 +79,16 @@ class Law:
         bias, matrix = self.at(temperature_c)
         return np.linalg.solve(matrix, (output_dps - bias)[:, :, None])[:, :, 0]
 
-    def u_of_fit(self, axis: str, rate_dps: float, temperature_c: float) -> float:
-        """Return u of a corrected rate by the covariance of the fit, deg/s, where the unit turns about that axis."""
-        warm = np.array([temperature_c])
+    def u_of_fit(self, rates_dps: Array, temperature_c: float, correlation: Array) -> Array:
+        """Return u of each corrected rate by the covariance of the fit, deg/s, at a rate about x, y and z.
+
+        `correlation` is that of the errors of the outputs, (axes, axes).
+        """
+        warm, own = np.array([temperature_c]), rates_dps[["xyz".index(axis) for axis in self.axes]][None, :]
         inverse = np.linalg.inv(self.at(warm)[1][0])
-        rates = np.where(np.array(self.axes) == axis, rate_dps, 0.0)
-        variance = 0.0
-        for row, each in enumerate(self.axes):
-            places = [self._place(name, row, warm) for name in self.names[each]]
-            slope = np.array([f[0] * (1.0 if stem == "bias" else rates[column]) for stem, column, f in places])
-            variance += inverse[self.axes.index(axis), row] ** 2 * float(slope @ self.covariance[each] @ slope)
-        return float(np.sqrt(variance))
+        slopes = {axis: self.columns(axis, own, warm)[0] for axis in self.axes}
+        u = np.sqrt([slopes[axis] @ self.covariance[axis] @ slopes[axis] for axis in self.axes])
+        return np.sqrt(np.diag(inverse @ (np.outer(u, u) * correlation) @ inverse.T))
 
 
 def centres(values: Array, level: Array) -> Array:
@@ -171,25 +170,6 @@ def waves(angle_rad: Array, turned_rad: Array, position: Array, axis: str) -> li
         np.where(position == up, of(middle) * shrink, 0.0)
         for up in np.unique(position) if up[-1] != axis for of in (np.cos, np.sin)
     ]  # fmt: skip
-
-
-def without_waves(
-    law: Law, temperature_c: Array, residual_dps: Array, shown_dps: Array, waves_of: Sequence[Sequence[Array]]
-) -> tuple[Array, dict[str, Array]]:
-    """Return residuals (n, axes) less the waves of the outputs that explain `shown_dps` best, and their amplitudes.
-
-    The waves pass through the correction, as outputs do. Their direction, which a version does not store, is all that
-    is taken from what is shown.
-    """
-    inverse = np.linalg.inv(law.at(temperature_c)[1])
-    columns = np.array([
-        (inverse[:, :, k] * wave[:, None]).ravel() for k, own in enumerate(waves_of) for wave in own
-    ]).T  # fmt: skip
-    found = np.linalg.lstsq(columns, (residual_dps - shown_dps).ravel(), rcond=None)[0]
-    ends = np.cumsum([len(own) for own in waves_of])
-    sizes = {axis: np.hypot(part[0::2], part[1::2])
-             for axis, part in zip(law.axes, np.split(found, ends[:-1]), strict=True)}  # fmt: skip
-    return residual_dps - (columns @ found).reshape(residual_dps.shape), sizes
 
 
 def in_bins(values: Array, n: Sequence[int]) -> dict[str, Array]:

@@ -14,16 +14,26 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from studies.page_figures_allan import freedom_of_white, interval, terms
+from studies.page_figures_allan import bounds, freedom_of_white, interval, terms
 from studies.page_figures_formulas import (
     Law,
     allan_deviation,
     bins_of_trace,
     in_bins,
-    waves,
-    without_waves,
+    white_std,
 )
-from studies.page_figures_recomputed import Sets, environment_of, law_of, residuals_of, sets_of, steps_of
+from studies.page_figures_left import Left
+from studies.page_figures_recomputed import (
+    Sets,
+    environment_of,
+    law_of,
+    residuals_of,
+    sets_of,
+    stability_of,
+    steps_of,
+    turning_size_of,
+)
+from studies.page_figures_refit import Means, Refit
 
 #: Sums in another order.
 ROUNDING = 1e-12
@@ -35,8 +45,9 @@ OF_A_MEAN = 1e-5
 FIVE_DIGITS, SINGLE_PRECISION = 5e-5, 6e-8
 #: The terms of an Allan variance are fitted in steps, which end where they change no digit of the figures shown.
 OF_THE_FIT = 1e-6
-#: The errors of the outputs of a triad are correlated, which is not written here.
-BESIDE_OTHER_OUTPUTS = 1e-3
+#: From deg/s and s to the units of N, B and K, deg/sqrt(h), deg/h and deg/h/sqrt(h).
+PER_HOUR = {"N": 60.0, "B": 3600.0, "K": 216_000.0}
+ON_SHEET = {"N": "angle_random_walk", "B": "bias_instability", "K": "rate_random_walk"}
 #: Columns of the trace that is compared: fewer than the readings, so that bins have several.
 POINTS = 1200
 
@@ -82,28 +93,50 @@ class Compared:
         return {axis: each[1] for axis, each in self.errors.items()}
 
     @cached_property
-    def _left_by_fit(self) -> tuple[dict[str, Any], dict[str, Any]]:
-        answer, sets, axes = self.get(self.path), self.sets, self.law.axes
-        if "once_per_turn_dps" not in answer["environment"]:
-            return self.residual_dps, {}
-        own = np.column_stack([self.residual_dps[axis] for axis in axes])
-        shown = np.full(own.shape, np.nan)
-        for part in self.get(f"{self.path}/criticism")["maps"]:
-            rows = np.searchsorted(sets.number, part["dataset"])
-            shown[rows, axes.index(part["axis"])] = part["residual_dps"]
-        each = [waves(sets.table_angle_rad, sets.turned_rad, sets.position, axis) for axis in axes]
-        left, sizes = without_waves(self.law, sets.temperature_c, own, shown, each)
-        return {axis: left[:, k] for k, axis in enumerate(axes)}, sizes
+    def refit(self) -> Refit:
+        """A fit of the version's law by the documentation of a fit."""
+        sets, stability = self.sets, stability_of(self.database, self.recording)
+        has_turning = "once_per_turn_dps" in self.get(self.path)["environment"]
+        turning_var = turning_size_of(self.database, self.recording) ** 2 / 2 if has_turning else 0.0
+        times = np.arange(float(len(sets.number))) if sets.t_s is None else sets.t_s
+        run = np.round(sets.mean.get("run", 0.0 * sets.number))
+        means = {
+            axis: Means(times, run, sets.table_rate_dps, self.white_var(axis), stability, turning_var)
+            for axis in self.law.axes
+        }
+        return Refit.of(self.law, sets, means)
+
+    @cached_property
+    def left(self) -> Left:
+        """What that fit leaves of each data set."""
+        return Left.of(self.refit)
+
+    def white_var(self, axis: str) -> Any:
+        """Return the variance of each mean by the white noise of its readings, (n,); None: they are not known."""
+        if not self.sets.raw:
+            return None
+        parts = np.split(self.sets.raw[f"gyro_{axis}"], self.sets.begins[1:-1])
+        return np.array([white_std(part) for part in parts]) ** 2 / self.sets.readings
+
+    @cached_property
+    def _waves_dps(self) -> dict[str, tuple[Any, Any]]:
+        """Axis -> the Earth's rate that goes round with the table, (n,), and its cosine and sine by position."""
+        refit = self.refit
+        parts = {axis: (len(names), refit.averaged[axis][0]) for axis, names in self.law.names.items()}
+        return {axis: (refit.columns[axis][:, k:] @ found[k:], found[k:]) for axis, (k, found) in parts.items()}
 
     @property
     def fitted_dps(self) -> dict[str, Any]:
         """Axis -> what the fit left, (n,): without the Earth's rate that goes round with the table."""
-        return self._left_by_fit[0]
+        axes, sets = self.law.axes, self.sets
+        output = np.column_stack([sets.output_dps[axis] - self._waves_dps[axis][0] for axis in axes])
+        left = self.law.corrected(output, sets.temperature_c) - np.column_stack([sets.own_rate_dps[a] for a in axes])
+        return {axis: left[:, k] for k, axis in enumerate(axes)}
 
     @property
     def once_per_turn_dps(self) -> dict[str, Any]:
         """Axis -> size of the Earth's rate that goes round with the table, by position, deg/s; {}: none is fitted."""
-        return self._left_by_fit[1]
+        return {axis: np.hypot(found[0::2], found[1::2]) for axis, (_, found) in self._waves_dps.items() if len(found)}
 
 
 def figure(name: str, shown: Any, own: Any, allowed: float = ROUNDING) -> Row:
@@ -194,11 +227,16 @@ def _allan(c: Compared, path: str) -> Iterator[Row]:
         yield figure("fitted curve of an Allan deviation", shown["model_dps"], model, FIVE_DIGITS)
         yield figure("angle random walk and its u, deg/sqrt(h)", [shown["N"]["value"], shown["N"]["u"]],
                      [60 * n, 60 * u], OF_THE_FIT)  # fmt: skip
-        (sheet,) = (
-            each for each in c.get(f"/api/units/{c.serial}/datasheet")["characteristics"]
-            if each["id"] == "angle_random_walk" and each["axis"] == axis
-        )  # fmt: skip
-        yield figure("data sheet: angle random walk", [sheet["value"], sheet["u"]], [n, u], OF_THE_FIT)
+        most = bounds(own**2, tau_s, m, len(readings))
+        unseen = [name for name in most if shown[name]["value"] is None]
+        yield figure("bounds of N, B and K", [shown[name]["at_most"] for name in unseen],
+                     [PER_HOUR[name] * most[name] for name in unseen], SMALL_DIFFERENCE)  # fmt: skip
+        sheet = {each["id"]: each for each in c.get(f"/api/units/{c.serial}/datasheet")["characteristics"]
+                 if each["axis"] == axis}  # fmt: skip
+        walk = sheet["angle_random_walk"]
+        yield figure("data sheet: angle random walk", [walk["value"], walk["u"]], [n, u], OF_THE_FIT)
+        yield figure("data sheet: bounds of N, B and K", [sheet[ON_SHEET[name]]["at_most"] for name in unseen],
+                     [most[name] for name in unseen], SMALL_DIFFERENCE)  # fmt: skip
 
 
 def campaign_page(c: Compared, campaign: int) -> Iterator[Row]:

@@ -59,6 +59,11 @@ class Sets:
         return float(self.rate_dps[0] @ first - self.table_rate_dps[0])
 
     @property
+    def t_s(self) -> Array | None:
+        """The middle of each data set, (n,) s: of the time in which its readings were taken; None: without times."""
+        return (self.from_s + self.until_s) / 2 if self.raw else self.mean.get("t_s")
+
+    @property
     def table_angle_rad(self) -> Array:
         """Where the table was at the beginning of each data set, (n,)."""
         return np.radians(self.table_angle_deg)

@@ -26,6 +26,8 @@ SIZES, HIDDEN_SIZES = (0.35, 0.6, 0.8, 1.0, 1.3, 1.7, 2.3, 3.2), (4.5, 6.5, 9.0)
 SPACINGS, SLOW, FLICKER_RATIO = (0.25, 3.0, 12.0, 50.0, 200.0), 0.05, 4.0
 #: Width of the prior of a size, a factor; largest drift over half the bias stability; that where none is stated, deg/s.
 PRIOR_FACTOR, LARGEST, USUAL_DPS = 2.5, 12.0, 0.004
+#: Groups of rates that are left out in turn.
+RATE_GROUPS = 11
 #: What noise that grows with the rate has to gain in log likelihood.
 GROWTH_GAIN = 3.0
 
@@ -76,16 +78,6 @@ def _runs(values: Array, width: Callable[[float], float]) -> Array:
             number, first = number + 1, values[k]
         found[k] = number
     return found
-
-
-def near_repeats(residual: Array, table_rate_dps: Array, temperature_c: Array, position: Array) -> float:
-    """Return the standard deviation of one data set by neighbours of nearly equal rate and temperature."""
-    same = 1e-3 * np.abs(table_rate_dps).max()
-    order = np.lexsort((temperature_c, np.round(table_rate_dps / same)))
-    near = (np.abs(np.diff(table_rate_dps[order])) <= same) & (np.diff(temperature_c[order]) <= SAME_TEMPERATURE_C)
-    near &= np.abs(np.diff(temperature_c[order])) <= SAME_TEMPERATURE_C
-    near &= position[order][1:] == position[order][:-1]
-    return float(np.sqrt(np.mean(np.diff(residual[order])[near] ** 2) / 2))
 
 
 @dataclass(frozen=True)
@@ -205,32 +197,38 @@ def _turning(columns: Array, means: Means) -> Array:
     return np.arange(columns.shape[1] - 4, columns.shape[1]) if means.turning_var else np.arange(0)
 
 
-def over_drifts(columns: Array, values: Array, means: Means) -> list[Fit]:
-    """Return the fit at each drift of the grid; with noise that grows with the rate where it is clearly likelier."""
+def over_drifts(columns: Array, values: Array, means: Means, *, only_shown: bool = False) -> list[Fit]:
+    """Return the fit at each drift of the grid; with noise that grows with the rate where it is clearly likelier.
+
+    `only_shown` is without the slow drifts that the scatter between data sets does not show, as of a noise floor.
+    """
     unexplained = _unexplained_dps(weighted(columns, values, means, Drift(0.0, (1.0,))), columns, values, means)
-    fits = _over_grid(columns, values, means, unexplained, 0.0)
+
+    def at(per_rate: float) -> list[Fit]:
+        drifts = [each for each in means.grid(unexplained, per_rate) if each.is_shown or not only_shown]
+        modes = {taus: means.modes(taus, per_rate) for taus in {drift.taus_s for drift in drifts}}
+        return [weighted(columns, values, means, drift, modes[drift.taus_s]) for drift in drifts]
+
+    fits = at(0.0)
     best = max(fits, key=lambda fit: fit.log_likelihood)
     growing = _per_rate(best, means)
     if growing > 0:
-        more = _over_grid(columns, values, means, unexplained, growing)
+        more = at(growing)
         if max(fit.log_likelihood for fit in more) > best.log_likelihood + GROWTH_GAIN:
             return more
     return fits
 
 
-def _over_grid(columns: Array, values: Array, means: Means, unexplained_dps: float, per_rate: float) -> list[Fit]:
-    drifts = means.grid(unexplained_dps, per_rate)
-    modes = {taus: means.modes(taus, per_rate) for taus in {drift.taus_s for drift in drifts}}
-    return [weighted(columns, values, means, drift, modes[drift.taus_s]) for drift in drifts]
-
-
 def _unexplained_dps(first: Fit, columns: Array, values: Array, means: Means) -> float:
-    freedom = len(values) + len(_turning(columns, means)) - columns.shape[1]
+    turning = _turning(columns, means)
+    freedom = len(values) + len(turning) - columns.shape[1]
     largest = LARGEST * (means.stability_dps or USUAL_DPS) / 2 / max(SIZES)
     if means.white_var is None:
         return float(min(1.0, largest / np.sqrt(first.left @ first.left / freedom)))
-    prior = np.sum(first.values[_turning(columns, means)] ** 2) / means.turning_var if means.turning_var else 0.0
-    excess = (np.sum(first.left**2 / means.white_var) + prior) / freedom - 1
+    # what states the size of a once-per-turn amplitude counts as a data set, but shows no scatter of data sets
+    left = np.concatenate([first.left, first.values[turning]])
+    variance = np.concatenate([means.white_var, np.full(len(turning), means.turning_var)])
+    excess = np.sum(left**2 / variance) / freedom - 1
     return float(min(np.sqrt(max(excess, 0.01) / np.mean(1 / means.white_var)), largest))
 
 
@@ -304,19 +302,41 @@ class Refit:
         """What the fit leaves of the outputs, axis -> (n,)."""
         return {axis: self.errors_dps[axis] - self.columns[axis] @ self.averaged[axis][0] for axis in self.law.axes}
 
+    @cached_property
+    def inside_dps(self) -> Array:
+        """Corrected less true rates of the fit itself, (n, axes)."""
+        return self._error_dps({axis: values for axis, (values, _) in self.averaged.items()})
+
+    @cached_property
+    def outside_temperature_dps(self) -> Array | None:
+        """The same of each data set by a fit without its temperature; None where what is left is not enough."""
+        parts = parts_left_out(self.sets.temperature_c)
+        return self._outside(parts) if len(parts) - 1 > self.law.temperature_degree else None
+
+    @cached_property
+    def outside_rate_dps(self) -> Array:
+        """The same without its rate: at most eleven groups of neighbouring rates are left out in turn."""
+        rates = np.round(self.sets.table_rate_dps, 3)
+        levels = np.unique(rates)
+        groups = np.array_split(levels, min(len(levels), RATE_GROUPS))
+        return self._outside([np.isin(rates, group) for group in groups])
+
     def rms_left_out(self) -> float | None:
         """Return the RMS error at temperatures left out in turn, deg/s; None where what is left is not enough."""
-        squares, parts = [], parts_left_out(self.sets.temperature_c)
-        if len(parts) - 1 <= self.law.temperature_degree:
-            return None
+        outside = self.outside_temperature_dps
+        return None if outside is None else float(np.sqrt(np.mean(outside**2)))
+
+    def _outside(self, parts: Sequence[Array]) -> Array:
+        """Return the errors of the data sets of each part by a fit to the others, at the drift of the fit to all."""
+        outside = np.empty((len(self.sets.number), len(self.law.axes)))
         for part in parts:
             found = {}
             for axis, fits in self.fits.items():
                 columns = self.columns[axis][~part]
                 means, values = self.means[axis].of(~part), self.errors_dps[axis][~part]
                 found[axis] = weighted(columns, values, means, drift_of(fits)).values
-            squares.append(self._error_dps(found)[part].ravel() ** 2)
-        return float(np.sqrt(np.mean(np.concatenate(squares))))
+            outside[part] = self._error_dps(found)[part]
+        return outside
 
     def _error_dps(self, found: Mapping[str, Array]) -> Array:
         """Return corrected less true rates, (n, axes), by coefficients; the waves are taken off the outputs first."""

@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 
 from studies.page_figures_budget import coverage_factor, effective_freedom, leaning_rad, line_of, of_datasheet
-from studies.page_figures_fit import white_var
 from studies.page_figures_formulas import alignment_deg, asymmetry, nonlinearity, slope_over, straight_line
-from studies.page_figures_pages import BESIDE_OTHER_OUTPUTS, OF_A_MEAN, SMALL_DIFFERENCE, Compared, Row, figure, rms
+from studies.page_figures_pages import OF_A_MEAN, SMALL_DIFFERENCE, Compared, Row, figure, rms
 from studies.page_figures_recomputed import clock_u_of, info_of, turning_size_of
 from studies.page_figures_refit import temperature_levels
 
@@ -52,8 +51,9 @@ def _uncertainty(c: Compared, validity: Any) -> Iterator[Row]:
     rate, warm = 0.5 * max(validity["rate_dps"]), float(np.mean(validity["temperature_c"]))
     answer = c.get(f"{c.path}/uncertainty?rate_dps={rate}&temperature_c={warm}")
     for axis, one in answer["axes"].items():
-        own = [c.law.u_of_fit(axis, rate, warm)]
-        yield figure("u of the coefficients in use", [one["coefficients_dps"]], own, BESIDE_OTHER_OUTPUTS)
+        own = c.law.u_of_fit(np.where(np.array(list("xyz")) == axis, rate, 0.0), warm, c.left.correlation)
+        yield figure("u of the coefficients in use", [one["coefficients_dps"]], [own[c.law.axes.index(axis)]],
+                     SMALL_DIFFERENCE)  # fmt: skip
         budget = answer["budget"][axis]
         yield from _bench(c, axis, budget, rate, warm)
         first_order = [line for line in budget["lines"] if line["u"] is not None and line["sensitivity"]]
@@ -134,7 +134,7 @@ def _characteristics(c: Compared, axis: str) -> dict[str, Any]:
     values, u = (np.array(each) for each in zip(*lines, strict=True))
     usual = int(np.argmin(np.abs(warm - 25)))
     rows = about & (level == usual)
-    rate, output, white = sets.own_rate_dps[axis][rows], sets.output_dps[axis][rows], white_var(c, axis)
+    rate, output, white = sets.own_rate_dps[axis][rows], sets.output_dps[axis][rows], c.white_var(axis)
     (bias, slope), (u_bias, u_slope) = values[usual], u[usual]
     own = {
         "bias": [bias, u_bias],

@@ -49,7 +49,8 @@ class CriticisedNoise(CorrelationTimes):
     drift_dps: float | None
     """Standard deviation of the drift between data sets, of the axis where it is largest, deg/s; null: unknown."""
     vs_datasheet: float | None
-    """Largest drift divided by half the bias stability of the data sheet, at least 0; null: unknown."""
+    """Largest drift divided by half the bias stability of the data sheet, at least 0; null: unknown, or the drift is
+    taken from the data sheet."""
     static: StaticRecordJson | None
     """Allan deviation of the longest stretch at rest; null: there is none with enough readings."""
 

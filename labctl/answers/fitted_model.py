@@ -231,7 +231,8 @@ class CorrelationTimes(TypedDict):
     """How long a drift between data sets keeps its value."""
 
     drift_tau_s: float | None
-    """Correlation time of the drift, the longest where it has several, s; null: there is no drift, or it is unknown."""
+    """Correlation time of the drift, the longest where it has several, s; null: there is no drift, or it is unknown, as
+    of a drift by the data sheet."""
     drift_shortest_tau_s: NotRequired[float | None]
     """Shortest correlation time of flicker, of which each decade has an equal part, s; absent or null: only one."""
 

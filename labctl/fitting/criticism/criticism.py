@@ -137,7 +137,7 @@ class Criticism:
 
     @property
     def drift_over_datasheet(self) -> float | None:
-        """The largest drift found, over half the data sheet's bias stability; None without a data sheet."""
+        """The largest drift found, over half the data sheet's bias stability; None where one of both is not known."""
         return self._over_datasheet(attrgetter("drift_dps"))
 
     @property
@@ -148,6 +148,8 @@ class Criticism:
     def _over_datasheet(self, size_dps: Callable[[Drift], float]) -> float | None:
         stability = self.data.info.stability_dps
         if not stability or self.comparison is None:
+            return None
+        if not all(noise.is_drift_found for noise in self.floor.axes.values()):  # the data sheet over itself
             return None
         return max(size_dps(noise.drift) for noise in self.floor.axes.values()) / (stability / 2)
 

@@ -30,6 +30,8 @@ REPEAT_TEMPERATURE_C = SAME_TEMPERATURE_C
 REPEATS_NEEDED = 8
 #: Of fewer data sets than this the drift is that of the data sheet, if it states one.
 MIN_SETS = 16
+#: Where the noise floor is from: white noise of the readings beside a drift that no data sets show.
+BY_DATA_SHEET = "within data sets, and by the data sheet"
 #: Probability at which noise alone is taken for a law that no smooth function of temperature follows.
 FALSE_ALARM = 1e-4
 
@@ -41,6 +43,12 @@ class AxisNoise:
     floor_dps: Array  #: (m,) standard deviation of each mean, white and drift together; NaN where it is not known
     white_dps: float | None  #: root mean square of the white part; None where the readings are not known
     drift: Drift
+    is_drift_found: bool = True  #: by the scatter between data sets; False: its size is the data sheet's
+
+    @property
+    def correlation_times(self) -> CorrelationTimes:
+        """The time constants of the drift, as JSON; a data sheet states none."""
+        return correlation_times(self.drift) if self.is_drift_found else {"drift_tau_s": None}
 
 
 @dataclass(frozen=True)
@@ -98,12 +106,13 @@ def _with_known_white(
         elif enough:
             drift = _drift(surface, with_levels_of_temperature(surface, channels, axis), errors_dps[axis], noise)
         else:
-            drift = Drift(float(stability or 0.0), 1.0)
+            drift = Drift(float(stability or 0.0), 1.0)  # the time constant is one to weight by, and not known
         floor = np.sqrt(noise.white_var + drift.drift_dps**2 + (drift.per_rate * noise.rate_dps) ** 2)
-        axes[axis] = AxisNoise(np.asarray(floor), float(np.sqrt(noise.white_var.mean())), drift)
+        is_found = enough or channels.profile is not None
+        axes[axis] = AxisNoise(np.asarray(floor), float(np.sqrt(noise.white_var.mean())), drift, is_found)
     if enough:
         return NoiseFloor(axes, "within and between data sets")
-    return NoiseFloor(axes, "within data sets, and by the data sheet" if stability else "within data sets")
+    return NoiseFloor(axes, BY_DATA_SHEET if stability else "within data sets")
 
 
 def _drift_of_many(surface: NDArray[np.float64], error_dps: Array, scatter: Scatter) -> Drift:

@@ -15,7 +15,7 @@ from labctl.fitting.data.covered import Covered
 from labctl.fitting.data.earth_rate import turning_size_dps, up_rate_dps
 from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.data.mounting_angles import mountings_of
-from labctl.fitting.data.noise_floor import AxisNoise, correlation_times
+from labctl.fitting.data.noise_floor import AxisNoise
 from labctl.fitting.data.temperature.channel import is_chambers
 from labctl.fitting.data.temperature.history import TemperatureHistory
 from labctl.fitting.data.temperature.legs import legs_of
@@ -292,7 +292,7 @@ def _noise_json(noise: AxisNoise, solution: Solution) -> AxisNoiseJson:
     return {
         "white_dps": noise.white_dps,
         "drift_dps": noise.drift.drift_dps,
-        **correlation_times(noise.drift),
+        **noise.correlation_times,
         "per_rate": noise.drift.per_rate,
         "covariance_scale": None if np.isnan(solution.scale) else solution.scale,
     }

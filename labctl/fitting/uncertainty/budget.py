@@ -31,6 +31,7 @@ class BudgetLine:
     is_overdue: bool = False  #: whether the standard was past its due date when it was used
     due: str | None = None
     why: str = ""
+    parts: tuple[float, ...] = ()  #: contributions of the independent errors that it is the sum of; (): it is one
 
     def to_json(self) -> BudgetLineJson:
         """Return this line as JSON."""
@@ -87,7 +88,13 @@ def budget_of(result: str, unit_symbol: str, lines: Sequence[BudgetLine], value:
     sizes = [line.contribution or 0.0 for line in stated_lines]
     combined = combined_u(np.array(sizes))
     freedom = effective_freedom(sizes, [line.freedom for line in stated_lines])
-    k = coverage_factor(sizes, [line.distribution for line in stated_lines], freedom)
+    # two independent errors within limits are not one within wider limits: their sum is nearer to a normal one
+    parts = [
+        (part, line.distribution)
+        for line, size in zip(stated_lines, sizes, strict=True)
+        for part in line.parts or (size,)
+    ]
+    k = coverage_factor([part for part, _ in parts], [name for _, name in parts], freedom)
     expanded = half_width(k * combined, sum(line.uncorrected for line in stated_lines))
     return Budget(result, unit_symbol, value, tuple(lines), combined, freedom, k, expanded)
 

@@ -153,6 +153,7 @@ def _of_standard(standard: Standard, bench: BenchConditions, s: Sensitivities) -
             _size(sensitivity[row]),
             math.sqrt(covariance[row, row]),
             reason or SECOND * int(second[row] > 0),
+            tuple(part for part in (*(u * sensitivity[row]).tolist(), float(second[row])) if part),
         )
         for row in range(n)
     )
@@ -192,8 +193,9 @@ def _size(sensitivity: Array) -> float:
 
 
 def _line(
-    standard: Standard, bench: BenchConditions, sensitivity: float | None, contribution: float | None, reason: str
-) -> BudgetLine:
+    standard: Standard, bench: BenchConditions, sensitivity: float | None, contribution: float | None, reason: str,
+    parts: tuple[float, ...] = (),
+) -> BudgetLine:  # fmt: skip
     return BudgetLine(
         source=standard.quantity,
         name=standard.label,
@@ -209,6 +211,7 @@ def _line(
         is_overdue=standard.is_overdue(bench.used_on),
         due=None if standard.due is None else standard.due.isoformat(),
         why=reason,
+        parts=parts,
     )
 
 

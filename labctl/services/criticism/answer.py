@@ -18,7 +18,6 @@ from labctl.fitting.criticism import (
     where_it_fails,
     worst_data_sets,
 )
-from labctl.fitting.data.noise_floor import correlation_times
 from labctl.fitting.effects import CATALOGUE
 from labctl.probability_text import probability_text
 from labctl.services.criticism.advice_text import (
@@ -114,7 +113,7 @@ def _noise(criticism: Criticism) -> CriticisedNoise:
     return {
         "white_dps": float(np.sqrt(np.mean(np.square(known)))),
         "drift_dps": largest.drift.drift_dps,
-        **correlation_times(largest.drift),
+        **largest.correlation_times,
         "vs_datasheet": criticism.drift_over_datasheet,
         "static": static,
     }

@@ -13,6 +13,7 @@ from instruments.bench_config import BenchFile, GyroSettings
 from instruments.datasheet import datasheet_figure
 from labctl.errors import BadInput
 from labctl.fitting.data.channels import BODY_AXES, Channels
+from labctl.fitting.data.noise_floor import BY_DATA_SHEET
 from labctl.fitting.design.noise_figures import (
     OTHER_ELEMENT_U_S,
     USUAL_BIAS_PER_K,
@@ -123,8 +124,12 @@ def _earlier(store: Store, serial: str, span: Span) -> _Earlier:
     document = json.loads(row.document)
     noise = list(document["noise"].values())
     white = [each["white_dps"] for each in noise if each["white_dps"] is not None]
-    # flicker has no time constant: it counts as one that is not known
-    taus = [each["drift_tau_s"] for each in noise if each["drift_tau_s"] and "drift_shortest_tau_s" not in each]
+    # flicker has no time constant: it counts as one that is not known, as does that of a drift by the data sheet, for
+    # which earlier versions of labctl stored 1 s
+    is_found = document.get("error", {}).get("noise_floor_source") != BY_DATA_SHEET
+    taus = [
+        each["drift_tau_s"] for each in noise if is_found and each["drift_tau_s"] and "drift_shortest_tau_s" not in each
+    ]
     bias, scale = _slopes(FittedModel.from_dict(document["model"]), span)
     return _Earlier(
         f"{unit.serial} version {row.version}",

@@ -3564,7 +3564,7 @@ export interface components {
         AxisNoiseJson: {
             /**
              * Drift Tau S
-             * @description Correlation time of the drift, the longest where it has several, s; null: there is no drift, or it is unknown.
+             * @description Correlation time of the drift, the longest where it has several, s; null: there is no drift, or it is unknown, as of a drift by the data sheet.
              */
             drift_tau_s: number | null;
             /**
@@ -6444,7 +6444,7 @@ export interface components {
         CriticisedNoise: {
             /**
              * Drift Tau S
-             * @description Correlation time of the drift, the longest where it has several, s; null: there is no drift, or it is unknown.
+             * @description Correlation time of the drift, the longest where it has several, s; null: there is no drift, or it is unknown, as of a drift by the data sheet.
              */
             drift_tau_s: number | null;
             /**
@@ -6464,7 +6464,7 @@ export interface components {
             drift_dps: number | null;
             /**
              * Vs Datasheet
-             * @description Largest drift divided by half the bias stability of the data sheet, at least 0; null: unknown.
+             * @description Largest drift divided by half the bias stability of the data sheet, at least 0; null: unknown, or the drift is taken from the data sheet.
              */
             vs_datasheet: number | null;
             /** @description Allan deviation of the longest stretch at rest; null: there is none with enough readings. */

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from datetime import UTC, datetime
 from functools import cache
 
@@ -92,6 +93,24 @@ def test_a_fixture_that_leans_adds_what_drawn_fixtures_add() -> None:
     assert part(found, "fixture_angle") == pytest.approx(np.cov((leaning @ w).T), rel=0.05, abs=2e-4)
     turned_back = (leaning + leaning.transpose(0, 2, 1)) / 2  # the closest rotation is the antisymmetric part
     assert part(found, "fixture_angle", aligned=True) == pytest.approx(np.cov((turned_back @ w).T), rel=0.05, abs=2e-4)
+
+
+def test_table_tops_that_lean_within_limits_cover_as_drawn_ones_do() -> None:
+    """Two mountings lean independently of each other: the sum of two rectangular errors is triangular, and k is 1.93.
+
+    As one rectangular error it had k = 1.65, so that U about any axis was too small.
+    """
+    recording = ideal()
+    top = Standard(quantity="tilt", half_width=0.5, distribution="rectangular")
+    leaning = replace(recording, info=recording.info.model_copy(update={"standards": (top,)}))
+    found = at(leaning, {"x": 0.0, "y": 100.0, "z": 100.0}).budgets["x"]
+    (tilt,) = (line for line in found.lines if line.source == "tilt")
+    assert tilt.contribution is not None
+    assert np.linalg.norm(tilt.parts) == pytest.approx(tilt.contribution)
+    assert found.combined == pytest.approx(tilt.contribution, rel=1e-3)
+    drawn = np.random.default_rng(2).uniform(-np.sqrt(3), np.sqrt(3), (400_000, 2)) @ np.array(tilt.parts[:2])
+    assert found.expanded == pytest.approx(np.quantile(np.abs(drawn), 0.9545), rel=0.005)
+    assert found.k == pytest.approx(np.sqrt(6) * (1 - np.sqrt(1 - 0.9545)), rel=0.002)
 
 
 def test_along_its_own_axis_it_is_the_uncertainty_of_a_rate_about_this_axis() -> None:

@@ -30,6 +30,18 @@ def test_a_complete_model_is_adequate(seed: int) -> None:
     assert (found.verdict.form, found.verdict.named) == ("adequate", ())
 
 
+def test_a_drift_that_is_the_data_sheet_s_is_not_compared_with_the_data_sheet() -> None:
+    """The page once said that it was 2.0 times the data sheet's."""
+    whole = single_axis(1)
+    few = replace(whole, columns={name: values[np.asarray(whole.columns["dataset"]) <= 15]
+                                  for name, values in whole.columns.items()})  # fmt: skip
+    found = held(few, "bias")
+    assert found.comparison is not None
+    assert found.floor.source == "within data sets, and by the data sheet"
+    assert found.drift_over_datasheet is None
+    assert held(whole).drift_over_datasheet is not None
+
+
 @pytest.mark.slow
 def test_three_axes_with_nothing_hidden() -> None:
     assert held(three_axes(4), "yang2018").verdict.form == "adequate"

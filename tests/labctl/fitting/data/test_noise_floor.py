@@ -69,6 +69,8 @@ def test_few_data_sets_have_the_drift_of_the_data_sheet(number: int) -> None:
     assert floor.source == "within data sets, and by the data sheet"
     white_var = float(few.white_dps("z") or 0.0) ** 2
     assert floor.rms_dps == pytest.approx(np.sqrt(white_var + SHEET_DPS**2), rel=1e-6)  # in full: it says 1 sigma
+    assert floor.axes["z"].correlation_times == {"drift_tau_s": None}  # a data sheet states no time constant
+    assert data.noise_floor.axes["z"].correlation_times["drift_tau_s"] is not None
 
 
 def test_without_readings_repeats_tell_else_the_scatter_else_nothing() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -150,3 +151,17 @@ def test_an_earlier_calibration_states_the_noise(tmp_path: Any) -> None:
         answer = design_campaign(store, request, BENCH)
     assert sum(f"from {gyro.serial} version 1" in each for each in answer.assumptions) == 3
     assert answer.chosen.u_worst_dps != designed(hours=2.0).chosen.u_worst_dps
+
+
+@pytest.mark.slow
+def test_a_drift_by_the_data_sheet_of_an_earlier_calibration_has_no_time_constant(tmp_path: Any) -> None:
+    """It was stored as 1 s, so that a plan averaged it over its data sets."""
+    plan = make_plan(load_recipe("ojeda2000-121"), limits_of(BENCH))
+    whole = to_points(hidden_recording(plan, BENCH, BENCH.gyros[0], 3, {}))
+    few = replace(whole, columns={name: values[:15] for name, values in whole.columns.items()})
+    with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
+        store.recordings.add_import(few, AT)
+        fit_unit(store, few.info.serial, FitRequest(model="single_temperature"), AT)
+        request = DesignRequest.model_validate(SMALL | {"hours": 2.0, "prior": [few.info.serial]})
+        (drift,) = (each for each in design_campaign(store, request, BENCH).assumptions if each.startswith("drift"))
+    assert "(assumed)" in drift
