@@ -266,6 +266,16 @@ def drift_of(fits: Sequence[Fit]) -> Drift:
     return Drift(float(np.sqrt(share @ sizes**2)), best.drift.taus_s, best.drift.per_rate * float(np.sqrt(best.scale)))
 
 
+def weighting_drift(fits: Sequence[Fit], means: Means) -> Drift:
+    """Return the same as a fit to a part takes it: beside white noise as it is stated, else in units of that noise."""
+    shown = [fit for fit in fits if fit.drift.is_shown]
+    best, share = max(shown, key=lambda fit: fit.log_likelihood), shares(shown)
+    scales = np.array([fit.scale for fit in shown]) if means.white_var is None else np.ones(len(shown))
+    white_dps = 1.0 if means.white_var is not None else np.sqrt(best.scale)
+    sizes = np.array([fit.drift.size_dps for fit in shown])
+    return Drift(float(np.sqrt(share @ (scales * sizes**2)) / white_dps), best.drift.taus_s, best.drift.per_rate)
+
+
 @dataclass(frozen=True)
 class Refit:
     """A fit of the law of a version to the data sets, axis by axis; its columns: the coefficients, then the waves."""
@@ -334,7 +344,7 @@ class Refit:
             for axis, fits in self.fits.items():
                 columns = self.columns[axis][~part]
                 means, values = self.means[axis].of(~part), self.errors_dps[axis][~part]
-                found[axis] = weighted(columns, values, means, drift_of(fits)).values
+                found[axis] = weighted(columns, values, means, weighting_drift(fits, means)).values
             outside[part] = self._error_dps(found)[part]
         return outside
 

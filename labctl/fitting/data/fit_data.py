@@ -120,7 +120,9 @@ class FitData:
     def scatter(self, axis: str) -> Scatter:
         """Return what is known of the noise of one axis before the fit."""
         m = len(self)
-        t_s = np.asarray(self.channels["t_s"], dtype=np.float64) if "t_s" in self.channels else np.arange(float(m))
+        in_order = next((name for name in ("t_s", "dataset") if name in self.channels), None)
+        # without times the numbers of the data sets stand for them: some that are left out leave a gap
+        t_s = np.arange(float(m)) if in_order is None else np.asarray(self.channels[in_order], dtype=np.float64)
         return Scatter(
             t_s,
             np.asarray(self.channels["run"], dtype=np.int64) if "run" in self.channels else np.ones(m, dtype=np.int64),
