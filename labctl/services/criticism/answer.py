@@ -180,7 +180,7 @@ def sentences(criticism: Criticism, experiments: Sequence[Experiment] = ()) -> l
     answer_text += unusual_sizes(criticism)
     if verdict.form == "ambiguous" and verdict.indistinguishable:
         answer_text += to_distinguish(verdict.indistinguishable, experiments)
-    answer_text += advice_sentences(criticism.advice, verdict.groups)
+    answer_text += advice_sentences(criticism)
     if verdict.not_physical and verdict.groups:
         technology = criticism.data.info.technology or "this technology"
         answer_text.append(

@@ -199,6 +199,13 @@ def test_the_experiment_in_words_is_the_first_of_the_list() -> None:
     said = sentences(reported, [asked, {"do": "another"}])
     assert "To distinguish them: the rates in random order." in said
     assert not any("another" in line for line in said)
+    unlikely = asked | {"power": 0.1}
+    said = sentences(reported, [unlikely, unlikely | {"do": "another"}])
+    assert not any(line.startswith("To distinguish") for line in said)
+    only = "The best experiment for its time names one cause alone with a probability of only 10 %"
+    assert f"{only}: the rates in random order." in said
+    said = sentences(reported, [unlikely, asked | {"do": "the rates for a week"}])
+    assert f"{only}: the rates in random order. 60 % needs more time: the rates for a week." in said
     said = sentences(reported, [asked | {"power": 0.05}, {"do": "another"}])  # not expected to decide
     assert not any(line.startswith("To distinguish") for line in said)
     assert (
