@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from labctl.answers.criticism import Advice, Experiment
 from labctl.fitting.criticism import MIN_CAUSE, NOT_CHECKED, Criticism, Suspect
 from labctl.fitting.effects import CATALOGUE
@@ -15,6 +17,8 @@ from labctl.shown_unit import shown_unit
 COMMON = 0.8
 #: From this probability on that an experiment names the cause alone, it is said to distinguish the effects.
 LIKELY = 0.5
+#: Effects that are a function of the rate alone, alike up to some rate.
+RATE_LAWS = frozenset({"scale_factor_odd", "sine_response", "saturation"})
 #: What to do about a temperature that was not logged.
 LOG_IT = (
     "Log a second thermometer, near the sensing element or the electronics, or shield the unit from draught, sun and "
@@ -143,6 +147,22 @@ def to_distinguish(effects: Sequence[str], experiments: Sequence[Experiment]) ->
     text = (
         "No experiment that labctl can plan from these data is expected to name one cause alone; this one tells "
         f"most about how probable each effect is, {probability_text(share)} of the missing information: {first['do']}."
+    )
+    return [text]
+
+
+def beyond_the_rates(criticism: Criticism, experiments: Sequence[Experiment]) -> list[str]:
+    """Return where laws of the rate differ, if no experiment is likely to distinguish them; nothing for other effects.
+
+    Experiments are changes of a recipe like the recording, and go to no higher rate.
+    """
+    is_likely = any(naming_probability(each) >= LIKELY for each in experiments[:1])
+    if not experiments or is_likely or not RATE_LAWS.issuperset(criticism.verdict.indistinguishable):
+        return []
+    largest_dps = float(np.max(np.abs(criticism.data.at_sets(criticism.data.nodes.table_rate_dps()))))
+    text = (
+        f"Up to {largest_dps:.4g} deg/s these laws of the rate are nearly the same, and no experiment that labctl "
+        "plans goes to higher rates: they differ most there, as far as gyro and table allow them."
     )
     return [text]
 
