@@ -5,6 +5,8 @@ import { test } from "node:test";
 
 import {
   columnsBeside,
+  correlatedText,
+  differenceOf,
   differenceText,
   nominalText,
   termsText,
@@ -68,4 +70,22 @@ test("the nominal scale factor of each output is stated with its unit", () => {
   const said = nominalText(/** @type {any} */ ({ output }));
   assert.ok(said.endsWith(": axis z: −22 mV per deg/s, 2500 mV at rest; axis x: 1 deg/s per deg/s, 0 deg/s at rest."));
   assert.equal(nominalText({ output: {} }), "");
+});
+
+test("coefficients of fits of the same data have no difference in u, and the text says what changed", () => {
+  const fit = (/** @type {number[]} */ recordings, /** @type {string[]} */ effects) =>
+    /** @type {any} */ ({ recordings, model: { effects } });
+  const line = fit([1], ["bias", "scale_factor"]);
+  const text = correlatedText(fit([1], ["bias", "scale_factor", "scale_factor_odd"]), line);
+  assert.ok(text.startsWith("Both are fits of recording 1: their errors are correlated"));
+  assert.ok(text.endsWith("the slope of a straight line."));
+  assert.ok(!correlatedText(line, line).includes("another quantity"));
+  assert.equal(correlatedText(line, fit([2], ["bias"])), "");
+  const own = { value: -0.00127, u: 0.0003, unit: "1" };
+  const beside = { value: -0.0213, u: 0.0004, unit: "1" };
+  const name = "scale_factor";
+  assert.equal(differenceOf(own, beside, { name, shared: false }), "40 u");
+  assert.ok(differenceOf(own, beside, { name, shared: true }).endsWith(" ppm"));
+  assert.equal(differenceOf(own, null, { name, shared: true }), "–");
+  assert.equal(differenceOf({ ...own, u: null }, beside, { name, shared: false }), "–");
 });

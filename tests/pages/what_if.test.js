@@ -4,6 +4,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import {
+  bandOf,
   leftWith,
   levelMeans,
   partingLevels,
@@ -79,4 +80,13 @@ test("a recipe has the rates where they part, evenly chosen, and the outermost",
   assert.equal(listed[0], -20);
   assert.equal(listed.at(-1), 19);
   assert.match(text, /name = "a-b-c"/);
+});
+
+test("a coefficient that follows from another one leaves the band of the size", () => {
+  const square = { value: 0.064, u: 0.0016, unit: "(rad/(rad/s))^2" };
+  const root = { value: 0.253, u: 0.003, identified: true, at_most: null, unit: "rad/(rad/s)" };
+  assert.equal(bandOf({ k_squared: square, k: root }), (2 * 0.0016) / 0.064);
+  assert.equal(bandOf({ r3: square, r5: square }), null);
+  assert.equal(bandOf({ r3: { ...square, u: null } }), null);
+  assert.equal(bandOf({}), null);
 });

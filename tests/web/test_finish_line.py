@@ -154,6 +154,14 @@ def test_the_error_runs_from_the_one_version_to_the_other_and_ends_green(
     page.goto(f"{service.url}/explore?unit={unit}&version=2")  # the next step is there after a reload as well
     page.locator("main").get_by_role("button", name="Certify").click()
     expect(page.get_by_role("dialog")).to_contain_text("Certify version 2 of")
+    body = {"by": "A. Person", "reason": "corrects the error of the optics", "override": True}
+    service.post(f"/api/units/{unit}/calibrations/2/certify", body)
+    page.goto(f"{service.url}/explore?unit={unit}&version=2#finish")
+    expect(page.locator("#finish")).to_contain_text("This version is in force")
+    expect(page.locator("#finish")).to_contain_text("the cause is not known: sine response or scale factor odd")
+    page.get_by_role("link", name="Experiments to distinguish the causes").click()
+    expect(page).to_have_url(re.compile(r"version=1\b.*#learn"))
+    expect(page.get_by_role("link", name="Plan it").first).to_be_visible()
 
 
 @pytest.mark.slow

@@ -51,3 +51,23 @@ def test_a_step_of_the_tour_has_an_address_and_ends_with_the_page(visit: Callabl
     page.get_by_role("link", name="Units").click()
     expect(page.get_by_role("heading", level=1, name="Units")).to_be_visible()
     expect(page.get_by_role("region", name="Tour")).to_have_count(0)
+
+
+@pytest.mark.slow
+def test_a_version_that_is_made_during_the_tour_ends_it(visit: Callable[..., Page]) -> None:
+    from playwright.sync_api import expect
+
+    page = visit("/")
+    page.get_by_role("button", name="Take the tour").click()
+    tour = page.get_by_role("region", name="Tour")
+    for _ in range(3):
+        tour.get_by_role("button", name="Next").click()
+    expect(tour).to_contain_text("Step 4 of 5")
+    sine = page.get_by_role("region", name="Which effects are missing").get_by_role("listitem")
+    sine.filter(has_text="sine response").get_by_role("button", name="Add").first.click()
+    page.get_by_role("button", name="Make version 2").click()
+    page.wait_for_url("**version=2**")
+    expect(tour).to_contain_text("Step 5 of 5")
+    finish = page.locator("#finish.tour-here")
+    expect(finish).to_contain_text("Version 1")
+    expect(finish.get_by_role("button", name="Certify")).to_be_visible()

@@ -1,3 +1,4 @@
+from labctl.fitting.criticism.advice import NOT_CHECKED as NOT_CHECKED
 from labctl.fitting.criticism.estimated_shapes import (
     CandidateEstimates as CandidateEstimates,
     EstimatedShape as EstimatedShape,

@@ -25,9 +25,11 @@ from labctl.fitting.models.error_model import ErrorModel, is_exported
 from labctl.fitting.models.fitted_model import FittedModel, without
 from labctl.fitting.models.force_sensitivity import EFFECTS as OF_FORCE
 from labctl.fitting.models.presets import Preset, changed
+from labctl.fitting.models.temperature import LagrangeTable
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.drift_noise import Noise
 from labctl.progress import report_stage
+from labctl.texts import counted
 
 #: A part is tested within the temperatures that the others were fitted at, and so far beyond, K.
 BEYOND_K = 1.0
@@ -36,6 +38,8 @@ BEYOND_K = 1.0
 MIN_GAIN, MIN_GAIN_AT_REST = 0.01, 0.15
 #: From so many parts on the gain also has to exceed what their scatter explains, at this probability (Student's t).
 PARTS_THAT_SCATTER, CERTAIN = 3, 0.95
+#: How the reason begins where neither can be known: whether the export becomes better, and whether it does not.
+NOT_CHECKED = "no part of these data can be left out to check it"
 
 
 @dataclass(frozen=True)
@@ -46,6 +50,7 @@ class Exported:
     after_dps: float | None
     least_gain: float = MIN_GAIN
     is_chance: bool = False  #: whether the gain differs so from part to part that it may be none
+    needs: str = ""  #: where there is no error: what the data lack for one
 
     @property
     def is_better(self) -> bool:
@@ -99,7 +104,7 @@ def _why_not_better(exported: Exported) -> str:
     if exported.is_better:
         return ""
     if exported.before_dps is None or exported.after_dps is None:
-        return "no part of these data can be left out to check it"
+        return f"{NOT_CHECKED}{exported.needs}"
     scatter = ", and from part to part the difference scatters by more" if exported.is_chance else ""
     return (
         f"what would be exported does not become clearly better on parts left out of the fit: {exported.after_dps:.3g} "
@@ -130,9 +135,29 @@ def exported_errors(data: FitData, model: ErrorModel, beside: tuple[Term, ...], 
             continue
         for parts, values in zip(errors, axis_rms, strict=True):
             parts.append(values)
+    if not errors[0]:
+        return Exported(None, None, needs=_needs(data, presets[1].build(data)[0]))
     before, after = (_pooled(parts) for parts in errors)
     least_gain = MIN_GAIN if np.any(data.channels.table_rate_dps()) else MIN_GAIN_AT_REST
     return Exported(before, after, least_gain, _is_chance(*errors))
+
+
+def _needs(data: FitData, model: ErrorModel) -> str:
+    """Return what a recording at several temperatures lacks for one to be left out, and what to do; "" for others."""
+    at_rest = not np.any(data.channels.table_rate_dps())
+    if len(recordings_in(data.channels.columns)) > 1 or at_rest or data.info.motion == "turns":
+        return ""
+    least = max((kind_of(term).least(term)[1] for term in model.terms), default=1)
+    if isinstance(model.temperature, LagrangeTable):
+        least = max(least, model.temperature.points)
+    levels = data.distinct_temperatures()
+    if levels > least:
+        return ""
+    others = counted(levels - 1, "temperature")
+    return (
+        f": beside one that is left out, {others} remain, and the model needs {least}; measure at "
+        f"{counted(least + 1 - levels, 'more temperature')}, or add it and verify the version on another recording"
+    )
 
 
 def _is_chance(before: Sequence[dict[str, Array]], after: Sequence[dict[str, Array]]) -> bool:
@@ -156,7 +181,7 @@ def _squares(errors: dict[str, Array]) -> float:
 
 
 def _pooled(parts: Sequence[dict[str, Array]]) -> float | None:
-    return rms({axis: np.concatenate([part[axis] for part in parts]) for axis in parts[0]}) if parts else None
+    return rms({axis: np.concatenate([part[axis] for part in parts]) for axis in parts[0]})
 
 
 def _left(data_used: FitData, left_out: FitData, preset: Preset, noise: Mapping[str, Noise]) -> dict[str, Array]:

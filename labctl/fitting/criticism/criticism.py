@@ -23,7 +23,14 @@ from labctl.fitting.criticism.rivals import FAR
 from labctl.fitting.criticism.search.refinement import refined_term
 from labctl.fitting.criticism.search.stepwise import search_stepwise
 from labctl.fitting.criticism.slow_process import slow_process, with_hypothesis, without_harm
-from labctl.fitting.criticism.suspects import MIN_CAUSE, Suspect, is_only_shape, suspects_of, without_shapes
+from labctl.fitting.criticism.suspects import (
+    MIN_CAUSE,
+    Suspect,
+    is_only_shape,
+    suspects_of,
+    with_groups,
+    without_shapes,
+)
 from labctl.fitting.criticism.thermal_family import LAG, ThermalFamily, family_or_hint, with_family
 from labctl.fitting.criticism.verdict import Verdict
 from labctl.fitting.criticism.visibility import not_testable
@@ -207,6 +214,7 @@ def criticise(
     report_stage("listing suspects and residuals")
     suspects = tuple(suspects_of(comparison, criticism.beside_missing, fit_data, forward, refined_term, base))
     verdict, suspects = _without_weak_names(criticism, suspects, forward), without_shapes(suspects, forward)
+    suspects = with_groups(suspects, verdict.groups)
     suspected = {*verdict.named, *(s.candidate.id for s in suspects if s.candidate.log_bf > 0)}
     return replace(
         criticism,

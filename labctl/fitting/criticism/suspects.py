@@ -119,6 +119,21 @@ def without_shapes(suspects: Sequence[Suspect], model: ErrorModel) -> tuple[Susp
     )
 
 
+def with_groups(suspects: Sequence[Suspect], groups: Sequence[Sequence[str]]) -> tuple[Suspect, ...]:
+    """Return the suspects, each that a verdict names in the group of the verdict, itself first.
+
+    What cannot be distinguished from a suspect is judged from that suspect; the verdict judges from its leader, with
+    the noise that remains beside all that is missing. One recording has one list.
+    """
+    of_verdict = {name: group for group in groups for name in group}
+    return tuple(
+        replace(each, group=tuple(sorted(of_verdict[each.candidate.id], key=each.candidate.id.__ne__)))
+        if each.candidate.id in of_verdict
+        else each
+        for each in suspects
+    )
+
+
 def _is_worse(before: FitResult | None, after: FitResult) -> bool:
     """Return whether a fit leaves more of the data sets than the one before it."""
     if before is None or before.error.rms_dps is None or after.error.rms_dps is None:

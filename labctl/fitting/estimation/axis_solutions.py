@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -39,6 +39,9 @@ from labctl.fitting.numeric.variance_components import RandomEffects
 
 #: Steps after which a nonlinear coefficient is taken as it is.
 GAUSS_NEWTON_STEPS = 30
+#: Laws at a solution may differ from their tangents by this share of the residual. Where they differ by more, and
+#: coefficients of two effects are correlated so much, the data do not determine both.
+MAX_DEPARTURE, SAME_CORRELATION = 0.3, 0.999
 
 
 @dataclass(frozen=True)
@@ -182,9 +185,48 @@ def _converged(
     if not design.laws and late is None:
         return design, solution, late
     averaged = _solve_axis(data, model, axis, design, noise, late, prior)
-    if design.laws:  # an average over the noise leaves a law along its tangent, which may be far from it
+    if design.laws:  # an average over the noise leaves a law along its tangent
+        _require_settled(data, model, axis, design, averaged, known)
         averaged = replace(averaged, values=solution.values, residual=solution.residual)
     return design, averaged, late
+
+
+def _require_settled(
+    data: FitData, model: ErrorModel, axis: str, design: AxisDesign, solution: Solution, known: Collection[str]
+) -> None:
+    """Raise NotEnoughData where laws at the solution are not what their tangents are, for want of one effect or other.
+
+    The last solution averages over what the drift may be. Coefficients that the data determine hardly move by that; two
+    that the data hardly distinguish run far along each other, to where the tangent is not the law.
+    """
+    there = axis_design(data, model, axis, _law_coefficients(design, solution), known)
+    if there.names != design.names:
+        return
+    values = solution.values[: design.columns.shape[1]]
+    departs = there.offset_dps + there.columns @ values - design.offset_dps - design.columns @ values
+    if np.linalg.norm(departs) <= MAX_DEPARTURE * np.linalg.norm(solution.residual):
+        return
+    pair = _least_distinguished(design, solution)
+    if pair is not None:
+        raise NotEnoughData(
+            f"{data.info.serial}, axis {axis}, model {model.name}: {pair[0]} and {pair[1]} together are not determined "
+            "by these data, in which they are nearly the same; leave one of them out, or fit the model to recordings "
+            "that distinguish them"
+        )
+
+
+def _least_distinguished(design: AxisDesign, solution: Solution) -> tuple[str, str] | None:
+    """Return the two effects whose coefficients are correlated most, where that is nearly 1."""
+    c = design.columns.shape[1]
+    covariance = design.spread @ solution.covariance[:c, :c] @ design.spread.T
+    u = np.sqrt(np.diag(covariance))
+    correlation = np.abs(covariance) / np.maximum(np.outer(u, u), 1e-300)
+    owners = np.repeat([owner for owner, _, _ in design.names], len(u) // max(len(design.names), 1))
+    correlation[owners[:, None] == owners] = 0.0
+    if not correlation.size or correlation.max() < SAME_CORRELATION:
+        return None
+    one, other = np.unravel_index(int(np.argmax(correlation)), correlation.shape)
+    return str(owners[one]), str(owners[other])
 
 
 def _law_coefficients(design: AxisDesign, solution: Solution) -> dict[str, NDArray[np.float64]]:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from labctl.answers.criticism import Advice, Experiment
-from labctl.fitting.criticism import MIN_CAUSE, Criticism, Suspect
+from labctl.fitting.criticism import MIN_CAUSE, NOT_CHECKED, Criticism, Suspect
 from labctl.fitting.effects import CATALOGUE
 from labctl.probability_text import odds_text, probability_text
 from labctl.services.criticism.next_experiment import MIN_NAMING, naming_probability
@@ -13,6 +15,10 @@ from labctl.shown_unit import shown_unit
 
 #: From this share of the variance of several axes on, their slow courses are one.
 COMMON = 0.8
+#: From this probability on that an experiment names the cause alone, it is said to distinguish the effects.
+LIKELY = 0.5
+#: Effects that are a function of the rate alone, alike up to some rate.
+RATE_LAWS = frozenset({"scale_factor_odd", "sine_response", "saturation"})
 #: What to do about a temperature that was not logged.
 LOG_IT = (
     "Log a second thermometer, near the sensing element or the electronics, or shield the unit from draught, sun and "
@@ -120,14 +126,23 @@ def unusual_sizes(criticism: Criticism) -> list[str]:
 def to_distinguish(effects: Sequence[str], experiments: Sequence[Experiment]) -> list[str]:
     """Return what distinguishes effects: the first experiment, or that none is expected to; without any the usual ones.
 
-    An experiment that is not expected to name the cause (`next_experiment.MIN_NAMING`) is not recommended as if it did.
+    An experiment that is not expected to name the cause (`LIKELY`) is not recommended as if it did.
     """
     if not experiments:
         usual = dict.fromkeys(CATALOGUE[each].experiment for each in effects[:3] if each in CATALOGUE)
         return [f"To distinguish them: {experiment}." for experiment in usual]
     first = experiments[0]
-    if naming_probability(first) >= MIN_NAMING:
+    naming = naming_probability(first)
+    if naming >= LIKELY:
         return [f"To distinguish them: {first['do']}."]
+    if naming >= MIN_NAMING:
+        surer = next((each for each in experiments[1:] if naming_probability(each) >= LIKELY), None)
+        more = f" {probability_text(surer['power'])} needs more time: {surer['do']}." if surer is not None else ""
+        text = (
+            "The best experiment for its time names one cause alone with a probability of only "
+            f"{probability_text(first['power'])}: {first['do']}.{more}"
+        )
+        return [text]
     share = first["information_bit"] / first["open_bit"]
     text = (
         "No experiment that labctl can plan from these data is expected to name one cause alone; this one tells "
@@ -136,25 +151,64 @@ def to_distinguish(effects: Sequence[str], experiments: Sequence[Experiment]) ->
     return [text]
 
 
-def advice_sentences(advice: Sequence[Advice], groups: Sequence[Sequence[str]]) -> list[str]:
-    """Return what to add and what not, one sentence for each effect that was named; `groups` are those of the verdict.
+def beyond_the_rates(criticism: Criticism, experiments: Sequence[Experiment]) -> list[str]:
+    """Return where laws of the rate differ, if no experiment is likely to distinguish them; nothing for other effects.
+
+    Experiments are changes of a recipe like the recording, and go to no higher rate.
+    """
+    is_likely = any(naming_probability(each) >= LIKELY for each in experiments[:1])
+    if not experiments or is_likely or not RATE_LAWS.issuperset(criticism.verdict.indistinguishable):
+        return []
+    largest_dps = float(np.max(np.abs(criticism.data.at_sets(criticism.data.nodes.table_rate_dps()))))
+    text = (
+        f"Up to {largest_dps:.4g} deg/s these laws of the rate are nearly the same, and no experiment that labctl "
+        "plans goes to higher rates: they differ most there, as far as gyro and table allow them."
+    )
+    return [text]
+
+
+def advice_sentences(criticism: Criticism) -> list[str]:
+    """Return what to add and what not, one sentence for each effect that was named.
 
     What is advised of several effects that cannot be distinguished is the one with the most evidence, also where
     another one would leave a little less error.
     """
-    alike = {name: len(group) for group in groups for name in group}
     return [
-        _advised(each, alike.get(each["effect"], 1)) if each["add"] else f"Do not add {each['effect']}: {each['why']}."
-        for each in advice
+        _advised(each, criticism) if each["add"] else _not_advised(each["effect"], each["why"])
+        for each in criticism.advice
     ]
 
 
-def _advised(advice: Advice, alike: int) -> str:
-    why = f", of {alike} effects that cannot be distinguished the one with the most evidence" if alike > 1 else ""
+def _not_advised(effect: str, why: str) -> str:
     return (
-        f"Adding {advice['effect']} is advised{why}: on the parts left out of the fit, the exported calibration then "
-        f"leaves an error of {advice['after_dps']:.3g} deg/s, now {advice['before_dps']:.3g} deg/s."
+        f"Whether to add {effect} is not known: {why}."
+        if why.startswith(NOT_CHECKED)
+        else f"Do not add {effect}: {why}."
     )
+
+
+def _advised(advice: Advice, criticism: Criticism) -> str:
+    return (
+        f"Adding {advice['effect']} is advised{_first_of_group(advice['effect'], criticism)}: on the parts left out of "
+        f"the fit, the exported calibration then leaves an error of {advice['after_dps']:.3g} deg/s, now "
+        f"{advice['before_dps']:.3g} deg/s."
+    )
+
+
+def _first_of_group(effect: str, criticism: Criticism) -> str:
+    """Return why an effect is advised and not those that the data cannot tell from it, after a comma; "" alone."""
+    group = next((group for group in criticism.verdict.groups if effect in group), (effect,))
+    if len(group) == 1:
+        return ""
+    text = f", of {len(group)} effects that cannot be distinguished the one with the most evidence"
+    log_bf = {each.candidate.id: each.candidate.log_bf for each in criticism.suspects if each.candidate.id in group}
+    others = sorted((name for name in log_bf if name != effect), key=log_bf.__getitem__, reverse=True)
+    if effect not in log_bf or not others:
+        return text
+    lead = log_bf[effect] - log_bf[others[0]]
+    if lead < 0.0:
+        return f"{text} that a calibration can carry"
+    return f"{text}, {odds_text(lead)} against {others[0]}"
 
 
 def why_not_named(criticism: Criticism) -> str:
@@ -187,9 +241,10 @@ def _odds(suspect: Suspect) -> str:
 def _worth(criticism: Criticism, suspects: Sequence[Suspect]) -> str:
     """Return how far the error falls with the best of the suspects, after a space; "" where it does not."""
     before = criticism.base.error.rms_dps if criticism.base is not None else None
-    fits = (suspect.after.error.rms_dps for suspect in suspects if suspect.after is not None)
-    least = min((rms_dps for rms_dps in fits if rms_dps is not None), default=None)
-    if before is None or least is None or least >= before:
+    after = {suspect.candidate.id: suspect.after.error.rms_dps for suspect in suspects if suspect.after is not None}
+    fitted = {name: rms_dps for name, rms_dps in after.items() if rms_dps is not None}
+    best = min(fitted, key=fitted.__getitem__, default="")
+    if before is None or not best or fitted[best] >= before:
         return ""
-    which = "With it" if len(suspects) == 1 else "With the best of them"
-    return f" {which} the error falls from {before:.4g} to {least:.4g} deg/s."
+    which = "it" if len(suspects) == 1 else best
+    return f" With {which} the error falls from {before:.4g} to {fitted[best]:.4g} deg/s."

@@ -22,6 +22,7 @@ from labctl.fitting.effects import CATALOGUE
 from labctl.probability_text import probability_text
 from labctl.services.criticism.advice_text import (
     advice_sentences,
+    beyond_the_rates,
     coarse_steps,
     doubtful,
     drifts,
@@ -179,7 +180,8 @@ def sentences(criticism: Criticism, experiments: Sequence[Experiment] = ()) -> l
     answer_text += unusual_sizes(criticism)
     if verdict.form == "ambiguous" and verdict.indistinguishable:
         answer_text += to_distinguish(verdict.indistinguishable, experiments)
-    answer_text += advice_sentences(criticism.advice, verdict.groups)
+        answer_text += beyond_the_rates(criticism, experiments)
+    answer_text += advice_sentences(criticism)
     if verdict.not_physical and verdict.groups:
         technology = criticism.data.info.technology or "this technology"
         answer_text.append(

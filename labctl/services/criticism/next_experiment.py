@@ -237,7 +237,9 @@ def _why(foreseen: Foreseen, question: OpenQuestion, of: int) -> str:
     order = _ORDER[foreseen.rank[0] > 0]
     rank = f"; {of} experiments that labctl can plan from these data are ordered by {order}" if of > 1 else ""
     listed = ", ".join(told[:NAMED]) + (f" and {len(told) - NAMED} more" if len(told) > NAMED else "")
-    pair = f"; if it is {leader}, this distinguishes it from {listed}" if told and foreseen.rank[0] > 0 else ""
+    untold = [name for name in question.effects[1:] if name not in told]
+    but = f", and not from {', '.join(untold[:NAMED])}" if 0 < len(untold) <= NAMED else ""
+    pair = f"; if it is {leader}, this distinguishes it from {listed}{but}" if told and foreseen.rank[0] > 0 else ""
     return f"{first}{rank}{pair}; {_naming_text(foreseen, question)}."
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
 from labctl.recording.sanity.finding import Finding
 from labctl.recording.sanity.readings.series import Array, Marked, Rows, Series, rows_in_words
@@ -21,6 +22,12 @@ HOT_C, HOT_SHARE = 150.0, 0.02
 JUMP_K_S, USUAL_HOLDS, USUAL_STEPS = 0.2, 2.0, 5.0
 #: Readings on either side that show whether a jump lasts, and the share of it that must.
 BESIDE, LASTING_SHARE = 9, 0.7
+#: Within a soak the temperature changes by less than this share of the jump to the next one.
+SOAK_SHARE = 0.2
+#: Rates that differ by less than this share of their span are one level.
+RATE_SHARE = 0.01
+#: Of rates in steps, more than this share of the readings have the rate of the one before.
+HELD_SHARE = 0.75
 #: The reading after a jump is that before in the other unit where it is this near, K.
 NEAR_K = 2.0
 
@@ -107,16 +114,44 @@ def _check_jumps(series: Series, name: str, values: Array, usable: Rows) -> Iter
     rows = np.zeros(len(values), dtype=bool)
     rows[at[jumps]] = True
     size = float(values[row] - before)
+    cause, remedy = _SOAKS if _are_soaks(series, values, at[jumps]) else _THERMOMETER
     yield Marked(
         Finding(
             "thermometer", "likely", f"{name}, {rows_in_words(rows)}",
             f"the temperature changes by {size:.3g} K from one reading to the next at row {row + 1}, and stays there: "
-            "the thermometer stood still before, or was exchanged or moved",
-            size, "K", "a temperature that changes slowly",
-            "find which of the two parts is right, and import only that", channel=name, n=len(jumps),
+            f"{cause.format(parts=len(jumps) + 1)}",
+            size, "K", "a temperature that changes slowly", remedy, channel=name, n=len(jumps),
         ),
         rows,
     )  # fmt: skip
+
+
+#: What a lasting jump of a temperature comes from, and what to do.
+_THERMOMETER = (
+    "the thermometer stood still before, or was exchanged or moved",
+    "find which of the parts is right, and import only that",
+)
+_SOAKS = (
+    "the same rates follow at each temperature, so {parts} soaks were joined without the time between them",
+    "give each row its true time; if the thermometer was exchanged or moved, import only the part that is right",
+)
+
+
+def _are_soaks(series: Series, values: Array, starts: NDArray[np.intp]) -> bool:
+    """Return whether temperatures stand still between jumps, whose later parts have `starts`, at the same few rates."""
+    if series.rate_dps is None or not np.ptp(series.rate_dps):
+        return False
+    parts = np.split(np.arange(len(values)), starts)
+    jump = float(np.min(np.abs(values[starts] - values[starts - 1])))
+    steps = series.rate_dps / (RATE_SHARE * float(np.ptp(series.rate_dps)))
+    held = np.abs(np.diff(steps, prepend=steps[0])) < 1.0
+    levels = [set(np.round(steps[part]).tolist()) for part in parts]
+    return (
+        all(float(np.ptp(values[part])) < SOAK_SHARE * jump for part in parts)
+        and float(held.mean()) > HELD_SHARE
+        and len(levels[0]) > 1
+        and all(len(levels[0] & each) > len(levels[0] | each) / 2 for each in levels[1:])
+    )
 
 
 def lasting_jumps(t_s: Array, values: Array) -> list[int]:

@@ -7,14 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from labctl.fitting.criticism.advice import exported_errors
+from labctl.fitting.criticism.advice import NOT_CHECKED, advice_for, exported_errors
 from labctl.fitting.criticism.held_out_recordings import held_out_recordings
 from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.data.joined import joined_recording
 from labctl.fitting.effects import Term
 from labctl.fitting.estimation.fit import fit
+from labctl.fitting.models.presets import preset_for
 from labctl.recording import Recording
 from tests.helpers.joint_recordings import EFFECTS, WHITE_DPS, recordings
+from tests.helpers.simulated_recordings import single_axis
 
 SUPPLY = Term("supply_sensitivity")
 STEPS_V = (-0.25, 0.0, 0.25)
@@ -69,3 +71,21 @@ def test_the_steps_of_one_recording_are_enough_to_advise_the_effect(dps_per_v: f
     assert checked.before_dps is not None
     assert checked.after_dps is not None
     assert checked.after_dps < 1.1 * checked.before_dps
+
+
+@pytest.mark.parametrize(("levels", "said"), [(3, "2 temperatures remain, and the model needs 3"), (4, None)])
+def test_how_many_temperatures_are_missing_for_one_to_be_left_out_is_said(levels: int, said: str | None) -> None:
+    whole = fit_data_of(single_axis(1))
+    warm = np.asarray(whole.channels["chamber_setpoint_c"], dtype=np.float64)
+    steps = np.unique(warm)
+    kept = whole.take(np.isin(warm, steps[:: len(steps) // levels][:levels]))
+    model, _ = preset_for("bias_scale", []).build(kept)
+    checked = exported_errors(kept, model, (), Term("scale_factor_odd"))
+    assert (checked.before_dps is None) is (said is not None)
+    advice = advice_for(kept, model, [Term("scale_factor_odd")])[0]["why"]
+    if said is None:
+        assert not advice.startswith(NOT_CHECKED)
+    else:
+        assert advice.startswith(
+            f"{NOT_CHECKED}: beside one that is left out, {said}; measure at 1 more temperature, or"
+        )

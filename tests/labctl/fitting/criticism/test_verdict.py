@@ -199,6 +199,16 @@ def test_the_experiment_in_words_is_the_first_of_the_list() -> None:
     said = sentences(reported, [asked, {"do": "another"}])
     assert "To distinguish them: the rates in random order." in said
     assert not any("another" in line for line in said)
+    unlikely = asked | {"power": 0.1}
+    assert not any("higher rates" in line for line in said)
+    said = sentences(reported, [unlikely, unlikely | {"do": "another"}])
+    largest_dps = float(np.max(np.abs(found.fit_data.true_rate_dps("z"))))
+    assert any(line.startswith(f"Up to {largest_dps:.4g} deg/s these laws of the rate are nearly") for line in said)
+    assert not any(line.startswith("To distinguish") for line in said)
+    only = "The best experiment for its time names one cause alone with a probability of only 10 %"
+    assert f"{only}: the rates in random order." in said
+    said = sentences(reported, [unlikely, asked | {"do": "the rates for a week"}])
+    assert f"{only}: the rates in random order. 60 % needs more time: the rates for a week." in said
     said = sentences(reported, [asked | {"power": 0.05}, {"do": "another"}])  # not expected to decide
     assert not any(line.startswith("To distinguish") for line in said)
     assert (

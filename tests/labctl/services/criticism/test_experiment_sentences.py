@@ -51,6 +51,14 @@ def test_where_none_is_expected_to_be_named_the_sentence_says_what_a_verdict_req
     )
 
 
+def test_what_an_experiment_does_not_distinguish_is_said_beside_what_it_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    ids = ("sine_response", "scale_factor_odd", "saturation")
+    why = why_of(monkeypatch, Forecast(0.4, 0.01, 0.1, 0.0, ("sine_response", "saturation")), ids)
+    assert "; if it is sine_response, this distinguishes it from saturation, and not from scale_factor_odd; " in why
+    why = why_of(monkeypatch, Forecast(0.4, 0.01, 0.8, 0.0, ids), ids)
+    assert "; if it is sine_response, this distinguishes it from scale_factor_odd, saturation; " in why
+
+
 def test_where_nothing_may_be_missing_the_sentence_says_how_probable_that_is(monkeypatch: pytest.MonkeyPatch) -> None:
     why = why_of(monkeypatch, Forecast(0.999, 0.01, 0.0, 0.0, ()), ("nothing", "saturation"))
     assert "is < 1 %, and that none is missing is 50 % at present: the information" in why

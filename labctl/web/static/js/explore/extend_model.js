@@ -5,7 +5,7 @@ import { scrollTo, setChildren, h } from "../core/elements.js";
 import { capitalised, number, idText } from "../core/format.js";
 import { actButton, button, fitWarnings, cardWithHeader, notice, table, toast } from "../core/components.js";
 import { labelledField, option, selectField } from "../core/fields.js";
-import { navigate } from "../core/router.js";
+import { navigate, query } from "../core/router.js";
 import { changedQuery } from "../core/routes.js";
 import { postFit } from "./accept_warnings.js";
 import { unlessTaken } from "./taken_version.js";
@@ -17,6 +17,9 @@ import { plausibility, relativeChange, residualFigure } from "./preview_result.j
 
 /** @import { Effect, Preview } from "../../../types/api.js" */
 /** @import { ExploreState } from "./state.js" */
+
+/** The step of the tour that a new version comes to. */
+const TOUR_STEP = 5;
 
 /** @typedef {{ add: Set<string>, remove: Set<string>, formula: string }} Changed */
 
@@ -155,7 +158,7 @@ export function extendModel(state, effects) {
                 : null,
           },
         ],
-        errorsOf(state),
+        errorsOf(state).filter(([key]) => found.before[key] !== null || found.error[key] !== null),
         { label: "Errors before and after" },
       ),
       fitWarnings(found),
@@ -195,9 +198,9 @@ export function extendModel(state, effects) {
     const steps = [stepOf(state), stepOfPreview(state, previewed, made.version)];
     const finish = finishLine(state, steps, `Version ${state.version} to version ${made.version}`);
     keepFor(state.serial, made.version, finish);
-    await navigate(
-      `/explore?${changedQuery("", { unit: state.serial, version: made.version, ...inAddress(state), axis: state.axis })}#finish`,
-    );
+    const tour = query().tour ? TOUR_STEP : null;
+    const to = { unit: state.serial, version: made.version, ...inAddress(state), axis: state.axis, tour };
+    await navigate(`/explore?${changedQuery("", to)}#finish`);
     await finish.play();
   }
 

@@ -2,11 +2,12 @@
 
 import { scrollTo, setChildren, h } from "../core/elements.js";
 import { inWords, withUncertainty, number, oddsText, probabilityText, idText, isNumber } from "../core/format.js";
-import { button, chip, factList, fitWarnings, cardWithHeader } from "../core/components.js";
+import { button, chip, factList, fitWarnings, cardWithHeader, notice } from "../core/components.js";
 import { equationDetails } from "../effects/equation.js";
 import { recordingsText } from "./chosen_recordings.js";
 import { axisNames } from "./dataset_rows.js";
 import { heldOutName } from "./first_models.js";
+import { verdictLines } from "./verdict_lines.js";
 import {
   aliasNotice,
   experimentList,
@@ -70,7 +71,7 @@ export function verdictCard(state, effects) {
   const of = new Set(criticism.joint?.text); // stands in the card of the recordings together
   of.add(criticism.why_not_named); // stands beside the suspects
   const ids = effects.map(({ id }) => id);
-  const [first, ...others] = criticism.text.filter((line) => !of.has(line)).map((line) => inWords(line, ids));
+  const { first, doubts, others } = verdictLines(criticism, of);
   const { error, noise } = criticism;
   const ratio = (error.rms_dps ?? NaN) / (error.noise_floor_dps ?? NaN);
   const ofFloor = Number.isFinite(ratio) ? `${number(ratio, 2)} times the floor` : null;
@@ -85,8 +86,14 @@ export function verdictCard(state, effects) {
       h("span", { class: "muted small" }, `version ${state.version} compared with ${recordingsText(state)}`),
     ),
     fitWarnings({ warnings: state.calibration.warnings?.filter((each) => each.what === "worse") }),
-    h("p", { class: "verdict-statement" }, first),
-    others.map((line) => h("p", { class: "muted" }, line)),
+    first.map((line) => h("p", { class: "verdict-statement" }, inWords(line, ids))),
+    doubts.length
+      ? notice(
+          "warn",
+          doubts.map((line) => h("p", {}, line)),
+        )
+      : null,
+    others.map((line) => h("p", { class: "muted" }, inWords(line, ids))),
     factList([
       isDirect
         ? ["RMS residual of the model as it corrects the output", number(error.direct_form_rms_dps), "deg/s"]
@@ -309,11 +316,11 @@ function evidenceMeter(nats) {
 function coefficientText(suspect, axis) {
   const own = suspect.coefficients[axis] ?? Object.values(suspect.coefficients)[0] ?? {};
   return Object.entries(own)
-    .map(([name, { value, u, unit }]) =>
+    .map(([name, { value, u, unit, identified }]) =>
       h(
         "div",
         { class: "small" },
-        h("span", { class: "muted" }, idText(name)),
+        h("span", { class: "muted" }, `${idText(name)}${identified === undefined ? "" : " (derived)"}`),
         " ",
         unbroken(withUncertainty(value, u === null ? null : 2 * u, unit, name)),
       ),

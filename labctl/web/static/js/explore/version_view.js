@@ -4,12 +4,10 @@ import { get, getFollowed, post } from "../core/http/api.js";
 import { isAbort } from "../core/http/errors.js";
 import { whenItMayPass } from "../core/http/recovery.js";
 import { setChildren, h } from "../core/elements.js";
-import { actButton, busyIndicator, button, errorPage, notice } from "../core/components.js";
+import { busyIndicator, errorPage } from "../core/components.js";
 import { option, toggleGroup } from "../core/fields.js";
-import { duration, idText } from "../core/format.js";
-import { navigate, show } from "../core/router.js";
-import { planAddress } from "../core/routes.js";
-import { elsewhere } from "../campaigns/elsewhere.js";
+import { duration } from "../core/format.js";
+import { show } from "../core/router.js";
 import { jointCard } from "../joint/card.js";
 import { asked as askedFor } from "./chosen_recordings.js";
 import { askComparison, errorComparison, isByRates } from "./compare/error_comparison.js";
@@ -17,6 +15,7 @@ import { axisNames, inDatasetOrder } from "./dataset_rows.js";
 import { errorLadder } from "./error_ladder.js";
 import { extendModel } from "./extend_model.js";
 import { takeKept } from "./finish_line.js";
+import { nextStep, nextSteps } from "./next_steps.js";
 import { residualDiagnostics } from "./residual_diagnostics.js";
 import { selectedRows } from "./residual_map.js";
 import { ExploreState } from "./state.js";
@@ -174,104 +173,6 @@ function sections({ unit, calibration, versions, chosen, motion, query, signal }
   });
   return [verdictCard(state, effects), end, joint, pageNavigation(state, axes), ...parts];
 }
-
-/**
- * Put a version in force, on the page of its unit.
- * @param {Given} given
- */
-const certify = async ({ unit: { serial }, calibration: { version } }) => {
-  const left = await navigate(`/units/${encodeURIComponent(serial)}?version=${version}`);
-  const { askCertification } = await import("../unit/certification.js"); // no weight of a first visit
-  await askCertification(serial, version, left);
-};
-
-/**
- * The step after a version: the experiment where it is not adequate, in force or not, else its certification; null for
- * an adequate version in force.
- * @param {Given} given
- * @param {Criticism} criticism
- */
-const nextStep = (given, criticism) =>
-  criticism.verdict !== "adequate"
-    ? h("div", { class: "row" }, nextExperiment(given, criticism, "")) // the advised effect has the prominent button
-    : given.unit.certified_version === given.calibration.version
-      ? null
-      : h(
-          "div",
-          { class: "row" },
-          actButton("Certify: put in force", () => certify(given), { kind: "primary" }),
-          h("span", { class: "muted" }, "Programs that ask for the calibration of this unit then get this version."),
-        );
-
-/**
- * What the new version has come to, and what can be done next.
- * @param {Given} given
- * @param {Criticism} criticism
- */
-function nextSteps(given, criticism) {
-  const isEnd = criticism.verdict === "adequate";
-  return [
-    notice(
-      isEnd ? "good" : "warn",
-      h("p", {}, h("strong", {}, criticism.text[0])),
-      isEnd
-        ? h(
-            "p",
-            {},
-            criticism.why_not_named
-              ? "These data say nothing more that can be relied on; see the suspects that are not named."
-              : "These data say nothing more: no effect of the catalogue has evidence in them.",
-          )
-        : null,
-      unknownCauses(criticism),
-    ),
-    h(
-      "div",
-      { class: "row" },
-      actButton("Certify: put in force", () => certify(given), { kind: isEnd ? "primary" : "" }),
-      nextExperiment(given, criticism, isEnd ? "" : "primary"),
-    ),
-  ];
-}
-
-/**
- * A link to the plan of the experiment that is advised, or to the recipes where none is. Without a bench a plan here
- * would be of another, simulated unit: what can be done with the recipe is shown instead.
- * @param {Given} given
- * @param {Criticism} criticism
- * @param {string} kind
- */
-function nextExperiment({ unit, hasBench }, { experiments }, kind) {
-  const plan = experiments.find((each) => each.toml)?.toml;
-  if (plan && !hasBench) return recipeToKeep(unit.serial, plan, kind);
-  const href = planAddress(plan ?? "", unit.serial);
-  return h("a", { class: `button ${kind}`, href }, plan ? "Next experiment" : "Plan a campaign");
-}
-
-/**
- * A button that shows once what can be done with the recipe of an experiment where no bench is.
- * @param {string} serial
- * @param {string} toml
- * @param {string} kind
- */
-function recipeToKeep(serial, toml, kind) {
-  const opening = button("Next experiment", () => setChildren(place, elsewhere(serial, { toml })), { kind });
-  const place = h("div", { style: "flex-basis: 100%", "aria-live": "polite" });
-  return [opening, place];
-}
-
-/**
- * What an adequate model does not show: which of several effects is the cause.
- * @param {Criticism} criticism
- */
-const unknownCauses = ({ undistinguished }) =>
-  undistinguished.map(({ effect, others }) =>
-    h(
-      "p",
-      {},
-      `The error is corrected; the cause is not known: ${[effect, ...others].map(idText).join(" or ")}. These data cannot distinguish them.`,
-    ),
-  );
 
 /**
  * What an effect would explain of the residual, data set by data set.

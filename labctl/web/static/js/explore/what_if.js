@@ -12,7 +12,15 @@ import { channelOf } from "./preview_result.js";
 import { hasMap, mapsOf } from "./residual_cells.js";
 import { residualMap, selectedRows } from "./residual_map.js";
 import { shapeSliders } from "./what_if_shape.js";
-import { leftWith, levelMeans, partingLevels, partingRecipe, rmsOf } from "./what_if_numbers.js";
+import {
+  bandOf,
+  freeCoefficients,
+  leftWith,
+  levelMeans,
+  partingLevels,
+  partingRecipe,
+  rmsOf,
+} from "./what_if_numbers.js";
 
 /** @import { Parameter, Suspect } from "../../../types/api.js" */
 /** @import { Figure, PlotTrace } from "../../../types/pages.js" */
@@ -65,7 +73,7 @@ export function whatIf({ state, suspect, parameters, others, explained, explain 
       channel,
       state,
       shown,
-      band: bandOf(suspect, state),
+      band: bandOf(suspect.coefficients[state.axis] ?? {}),
     }),
     leftFigure({ x, channel, state, left }),
     leftMap(state, left),
@@ -134,24 +142,13 @@ export function whatIf({ state, suspect, parameters, others, explained, explain 
  * @param {Values} left
  */
 function sizeWords(suspect, state, { share, isFitted }, left) {
-  const coefficients = isFitted ? Object.entries(suspect.coefficients[state.axis] ?? {}) : [];
+  const coefficients = isFitted ? freeCoefficients(suspect.coefficients[state.axis] ?? {}) : [];
   const sizes = coefficients.map(([name, { value, unit }]) =>
     coefficients.length > 1 ? null : `${idText(name)} ${withUncertainty(share * value, null, unit, name)}`,
   );
   const size = [`${percent(share)} of the fitted size`, ...sizes].filter(Boolean).join(", ");
   const of = shownText(state.criticism) ?? `${left.length} data sets`;
   return `${size}: ${number(rmsOf(left))} deg/s RMS left on axis ${state.axis}, over ${of}${isFitted ? "" : "; the size and all else are fitted again with this shape"}.`;
-}
-
-/**
- * Half the band of the size, k = 2, as a share of it; null for an effect of several coefficients, whose sizes go together.
- * @param {Suspect} suspect
- * @param {ExploreState} state
- */
-function bandOf(suspect, state) {
-  const coefficients = Object.values(suspect.coefficients[state.axis] ?? {});
-  const [only] = coefficients;
-  return coefficients.length === 1 && only.u !== null && only.value ? Math.abs((2 * only.u) / only.value) : null;
 }
 
 /**

@@ -2,6 +2,7 @@
 // fitted one and all other coefficients fitted again, each residual moves in a straight line from the fit without the
 // effect (share 0) to the fit with it (share 1).
 
+/** @import { Coefficient } from "../../../types/api.js" */
 /** @typedef {readonly (number | null)[]} Values */
 
 /**
@@ -24,6 +25,23 @@ export const leftWith = (before, explained, share) =>
 export function rmsOf(values) {
   const known = values.filter((value) => value !== null);
   return Math.sqrt(known.reduce((sum, value) => sum + value * value, 0) / Math.max(known.length, 1));
+}
+
+/**
+ * The coefficients of an effect that a fit estimates, without those that follow from them: k from its square.
+ * @param {Readonly<Record<string, Coefficient>>} coefficients
+ */
+export const freeCoefficients = (coefficients) =>
+  Object.entries(coefficients).filter(([, { identified }]) => identified === undefined);
+
+/**
+ * Half the band of the size, k = 2, as a share of it; null for an effect of several coefficients, whose sizes go together.
+ * @param {Readonly<Record<string, Coefficient>>} coefficients
+ */
+export function bandOf(coefficients) {
+  const free = freeCoefficients(coefficients);
+  const [[, only] = [null, null]] = free;
+  return free.length === 1 && only && only.u !== null && only.value ? Math.abs((2 * only.u) / only.value) : null;
 }
 
 /**

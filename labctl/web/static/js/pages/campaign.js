@@ -286,7 +286,7 @@ function recordingsCard(now, hasData) {
             linkButton(`Recording ${recording}`, `/recordings/${recording}`, "tiny"),
             hasData
               ? linkButton(
-                  "Fit and explore",
+                  "Explore",
                   `/explore?unit=${encodeURIComponent(serial)}&recording=${recording}`,
                   "tiny primary",
                 )

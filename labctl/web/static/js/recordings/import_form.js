@@ -169,7 +169,7 @@ function acceptedNotice(made, left) {
           class: "button primary",
           href: `/explore?unit=${encodeURIComponent(made.serial)}&recording=${made.recording}`,
         },
-        "Fit and explore",
+        "Choose a model and fit",
       ),
       h("a", { class: "button", href: `/recordings/${made.recording}` }, "Show it"),
     ),

@@ -25,11 +25,11 @@ export const STEPS = [
   {
     anchor: "#add",
     title: "Add it",
-    text: "“Add” beside a suspect puts it here. “Preview” fits the changed model and stores nothing; “Make version” keeps it as the next version. The present version stays as it is.",
+    text: "Press “Add” beside a suspect: the changed model is fitted, and nothing is stored. Then press “Make version” here: the tour goes on with the new version, and the present one stays as it is.",
   },
   {
-    anchor: "#watch",
+    anchor: "#finish, #watch",
     title: "Watch the error fall",
-    text: "The error of each version on the data it was fitted to, and on temperatures left out of the fit, down to the noise. When nothing is missing any more, certify the version on the page of the unit.",
+    text: "The error of each version on the data it was fitted to, and on temperatures left out of the fit, down to the noise. When nothing is missing any more, “Certify” at the top of this page puts the version in force.",
   },
 ];

@@ -101,7 +101,7 @@ export async function askCertification(serial, version, left = visitSignal()) {
   /** @type {keyof typeof AGAIN | null} */
   let already = null;
   const answers = await dialog(`Certify version ${version} of ${serial}: put it in force`, fields, {
-    text: "After this, every request for the calibration of this unit gets this version. The certification is written to the audit trail. It makes no document: a certificate for a customer is issued afterwards.",
+    text: `After this, every request for the calibration of this unit gets this version. The certification is written to the audit trail. It makes no document${never.length ? "." : ": a certificate for a customer is issued afterwards."}`,
     body: [
       assessed(known),
       never.length

@@ -1,6 +1,6 @@
 // Coefficients of a version that are columns over temperature.
 
-import { idText, plainNumber } from "../core/format.js";
+import { idText, number, plainNumber, withUncertainty } from "../core/format.js";
 
 /** @import { Coefficient, CoefficientAxis, CoefficientTable, Version } from "../../../types/api.js" */
 /**
@@ -73,6 +73,42 @@ export function differenceText(first, second) {
   if (first.columns === second.columns) return effects;
   const [table, single] = first.columns ? [first, second] : [second, first];
   return `${effects} The coefficients of version ${table.version} change with temperature, those of version ${single.version} are one value each.`;
+}
+
+/**
+ * Recordings that two versions were both fitted to.
+ * @param {Pick<Version, "recordings">} first
+ * @param {Pick<Version, "recordings">} second
+ */
+export const sharedRecordings = (first, second) => first.recordings.filter((each) => second.recordings.includes(each));
+
+/**
+ * Why the differences of coefficients are not given in u, and what else they may come from; empty for fits of other data.
+ * @param {Pick<Version, "recordings" | "model">} first
+ * @param {Pick<Version, "recordings" | "model">} second
+ */
+export function correlatedText(first, second) {
+  const shared = sharedRecordings(first, second);
+  if (!shared.length) return "";
+  const [one, other] = [first, second].map(({ model }) => [...model.effects].sort().join());
+  const redefined =
+    one === other
+      ? ""
+      : " Where the effects differ, a coefficient of the same name may be another quantity: beside a nonlinearity, the scale factor is the slope at rate 0, and without it the slope of a straight line.";
+  return `Both are fits of recording ${shared.join(", ")}: their errors are correlated, so a difference cannot be compared with u.${redefined}`;
+}
+
+/**
+ * The difference of two coefficients: in standard uncertainties where they come from different data.
+ * @param {Coefficient} own
+ * @param {Coefficient | null} beside
+ * @param {{ name: string, shared: boolean }} of
+ */
+export function differenceOf(own, beside, { name, shared }) {
+  if (!beside) return "–";
+  if (shared) return withUncertainty(own.value - beside.value, null, own.unit, name);
+  if (own.u === null || beside.u === null) return "–";
+  return `${number(Math.abs(own.value - beside.value) / Math.hypot(own.u, beside.u), 2)} u`;
 }
 
 /** @param {Pick<Version, "axes">} version */

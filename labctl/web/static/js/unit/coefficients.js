@@ -9,9 +9,12 @@ import { byHand } from "./by_hand.js";
 import {
   coefficientColumns,
   columnsBeside,
+  correlatedText,
+  differenceOf,
   differenceText,
   isSingle,
   nominalText,
+  sharedRecordings,
   termsText,
 } from "./coefficient_table.js";
 import { heldText } from "./held.js";
@@ -47,7 +50,7 @@ export function comparison(first, second) {
     "div",
     { class: "stack" },
     factList(
-      ERRORS.map(([key, title]) => [
+      ERRORS.filter(([key]) => first.error[key] !== null || second.error[key] !== null).map(([key, title]) => [
         title,
         number(first.error[key]),
         "deg/s",
@@ -72,7 +75,9 @@ export function coefficients(first, second) {
   const note = isKnown ? h("p", { class: "muted small" }, FIT_ALONE) : null;
   const terms = termsText(first);
   const nominal = new Set([first, ...(second ? [second] : [])].map(nominalText).filter(Boolean));
+  const correlated = second && correlatedText(first, second);
   const meaning = [
+    correlated ? h("p", { class: "muted small" }, correlated) : null,
     [...nominal].map((text) => h("p", {}, text)),
     h("p", { class: "muted small" }, terms ? `${terms} ` : null, equations(first)),
     h("p", { class: "muted small" }, DEFINITION),
@@ -207,6 +212,7 @@ function list(first, second) {
   );
   /** @param {typeof rows[number]} row */
   const texts = (row) => shownResult(row, row.name);
+  const shared = second !== null && sharedRecordings(first, second).length > 0;
   return table(
     [
       { title: "Axis", cell: (row) => row.axis },
@@ -233,10 +239,7 @@ function list(first, second) {
         ? {
             title: "Difference",
             number: true,
-            cell: (row) =>
-              row.beside && row.u !== null && row.beside.u !== null
-                ? `${number(Math.abs(row.value - row.beside.value) / Math.hypot(row.u, row.beside.u), 2)} u`
-                : "–",
+            cell: (row) => differenceOf(row, row.beside, { name: row.name, shared }),
           }
         : null,
     ],
