@@ -12718,6 +12718,16 @@ export interface components {
              */
             visibility?: boolean;
             /**
+             * Unit
+             * @description Serial number of a unit that the plan is a next experiment for: `visibility` is then that of the plan together with the recordings that its version was fitted to, beside the model of the version.
+             */
+            unit?: string | null;
+            /**
+             * Version
+             * @description Calibration version of `unit`; default: the newest.
+             */
+            version?: number | null;
+            /**
              * At
              * @description Intended time of the start, as in `POST /api/campaigns`.
              */
@@ -17084,6 +17094,17 @@ export interface components {
              * @default
              */
             experiment: string;
+            /**
+             * In Model
+             * @description Whether the effect is part of the model beside which it is judged; a fit then estimates it.
+             * @default false
+             */
+            in_model: boolean;
+            /**
+             * Order
+             * @description Order of the term that `smallest_size` is of, where the model absorbs the lower orders; null: the first, or the effect has no orders.
+             */
+            order: number | null;
         };
         /**
          * WatchedLimitResponse

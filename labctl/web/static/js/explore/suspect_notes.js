@@ -138,7 +138,13 @@ export function experimentList(criticism, ids) {
             : `; a wrong cause is then named with a probability of ${unbroken(probabilityText(each.names_wrong))}`,
         ),
         own[place] ? h("p", { class: "muted small" }, own[place]) : null,
-        each.toml ? h("a", { class: "button tiny", href: planAddress(each.toml, criticism.serial) }, "Plan it") : null,
+        each.toml
+          ? h(
+              "a",
+              { class: "button tiny", href: planAddress(each.toml, criticism.serial, criticism.version) },
+              "Plan it",
+            )
+          : null,
       ),
     ),
   );
