@@ -314,7 +314,8 @@ class LogPreview(ResponseModel):
     )
     problems: list[str] = Field(description="Everything that prevents the import; empty: the file can be imported.")
     warnings: list[DataWarning] = Field(
-        description="What is wrong with single rows and readings; those with `may_leave_out` can be left out by the "
+        description="What is wrong with the recording that the file becomes: rows, readings, and the gain against the "
+        "table; those with `may_leave_out` can be left out by the "
         "field `leave_out` of the import, by their kind `what`."
     )
     unused: list[str] = Field(description="Columns of the file that are not used.")

@@ -11453,7 +11453,7 @@ export interface components {
             problems: string[];
             /**
              * Warnings
-             * @description What is wrong with single rows and readings; those with `may_leave_out` can be left out by the field `leave_out` of the import, by their kind `what`.
+             * @description What is wrong with the recording that the file becomes: rows, readings, and the gain against the table; those with `may_leave_out` can be left out by the field `leave_out` of the import, by their kind `what`.
              */
             warnings: components["schemas"]["DataWarning"][];
             /**
