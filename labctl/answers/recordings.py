@@ -279,6 +279,9 @@ class LogTarget(ResponseModel):
     meaning: str = Field(description="What the column holds, in words.")
     unit: str = Field(description="Unit of the column in the recording; empty: none.")
     units: list[str] = Field(description="Units that a log may use for this quantity.")
+    aliases: dict[str, str] = Field(
+        default_factory=dict, description="Other names of these units, in small letters, with the name in `units`."
+    )
 
 
 class LogTrace(ResponseModel):

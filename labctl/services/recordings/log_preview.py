@@ -125,11 +125,15 @@ def _finite(values: Array) -> list[float | None]:
 
 def _targets() -> list[LogTarget]:
     return [
-        LogTarget(name=column.name, meaning=column.meaning, unit=unit, units=_units(unit))
+        LogTarget(name=column.name, meaning=column.meaning, unit=unit, units=_units(unit), aliases=_aliases(unit))
         for column in COLUMNS
         if column.name not in _NOT_OF_LOGS and not column.name.endswith("_std")
         for unit in [unit_of_target(column.name)]
     ]
+
+
+def _aliases(quantity: str) -> dict[str, str]:
+    return {alias.lower(): unit.name for unit in QUANTITIES.get(quantity, ()) for alias in unit.aliases}
 
 
 def _units(quantity: str) -> list[str]:

@@ -11517,6 +11517,13 @@ export interface components {
              * @description Units that a log may use for this quantity.
              */
             units: string[];
+            /**
+             * Aliases
+             * @description Other names of these units, in small letters, with the name in `units`.
+             */
+            aliases: {
+                [key: string]: string;
+            };
         };
         /**
          * LogTrace

@@ -31,6 +31,9 @@ def test_a_preview_of_a_log_stores_nothing(client: TestClient) -> None:
     trace = next(each for each in seen["traces"] if each["name"] == "gyro_x (deg/s)")
     assert len(trace["x"]) == len(trace["low"]) == 300
     assert any(each["name"] == "turn_deg" and "turn" in each["units"] for each in seen["targets"])
+    rate = next(each for each in seen["targets"] if each["name"] == "gyro_z")
+    assert rate["aliases"]["dps"] == "deg/s"  # a page lists the unit of a header once
+    assert set(rate["aliases"].values()) <= set(rate["units"])
     assert client.get("/api/recordings").json() == []
 
 

@@ -27,7 +27,7 @@ export function whyNoneIsNamed({ why_not_named: why, suspects }) {
     : "";
   return why
     ? `${alone} ${why}${unphysical}`
-    : `${alone} Counted, none that is physical is distinguished from noise.${unphysical}`;
+    : `${alone} With this number counted, no physical effect is distinguished from noise.${unphysical}`;
 }
 
 /**

@@ -265,9 +265,11 @@ function columnTable(seen, map, look) {
   /** @param {Row} row */
   function unitCell(row) {
     const found = entry(row);
-    const units = seen.targets.find((each) => each.name === found?.[0])?.units ?? [];
+    const quantity = seen.targets.find((each) => each.name === found?.[0]);
+    const [units, aliases] = [quantity?.units ?? [], quantity?.aliases ?? {}];
     if (!found || !units.length) return "–";
-    const [target, { unit = "", scale }] = found;
+    const [target, { unit: stated = "", scale }] = found;
+    const unit = aliases[stated.toLowerCase()] ?? stated; // dps is deg/s: listed once
     const shown = [option("", row.unit || "not given"), ...units.map((each) => option(each, each))];
     const known = unit === "" || units.includes(unit) ? shown : [...shown, option(unit, unit)];
     /** @type {HTMLInputElement} */
@@ -337,7 +339,7 @@ function plot(seen, map) {
     })),
     layout: {
       xaxis: { title: { text: seen.motion ? "time, s" : "row, or time in s where it is known" } },
-      yaxis: { title: { text: "value in the file" } },
+      yaxis: { title: { text: shown.length > 1 ? "value in the file" : `${shown[0].name}, as in the file` } },
       margin: { l: 70, r: 12, t: 8, b: 46 },
     },
   });
@@ -365,7 +367,7 @@ function asText(seen, look) {
   return h(
     "details",
     {},
-    h("summary", {}, "The map as text: parts, constants and everything else"),
+    h("summary", {}, "The column map as TOML: parts, constants and every other key"),
     text,
     h(
       "div",
