@@ -89,7 +89,7 @@ def test_a_page_that_was_refused_for_a_while_comes_by_itself(
 
 @pytest.mark.slow
 def test_an_answer_that_is_followed_is_read_to_its_end(service: Service, visit: Callable[..., Page]) -> None:
-    """A stream that a page leaves at its answer is a request that failed, for the browser and who looks at its log."""
+    """A stream that a page leaves at its answer is a failed request in the console of the browser."""
     from playwright.sync_api import expect
 
     made = service.post("/api/recordings/simulated", {"recipe": "short"})
