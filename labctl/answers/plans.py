@@ -17,6 +17,7 @@ from labctl.answers.common_fields import (
     ExpectedDuration,
     RecipeName,
     ScheduleHash,
+    Serial,
     StepCount,
 )
 from procedures.contracts.campaign_state import CampaignState
@@ -49,6 +50,13 @@ class PlanRequest(Request):
     visibility: bool = Field(
         default=False, description="Also compute which effects the plan could detect; takes some seconds."
     )
+    unit: Serial | None = Field(
+        default=None,
+        max_length=200,
+        description="Serial number of a unit that the plan is a next experiment for: `visibility` is then that of the "
+        "plan together with the recordings that its version was fitted to, beside the model of the version.",
+    )
+    version: int | None = Field(default=None, description="Calibration version of `unit`; default: the newest.", ge=1)
     at: str | None = Field(
         default=None, max_length=64, description="Intended time of the start, as in `POST /api/campaigns`."
     )
@@ -98,6 +106,15 @@ class Visibility(ResponseModel):
     needs: list[str] = Field(default_factory=list, description="Channels that would have to be logged; empty: none.")
     experiment: str = Field(
         default="", description="What would have to be measured to show the effect; empty: nothing more."
+    )
+    in_model: bool = Field(
+        default=False,
+        description="Whether the effect is part of the model beside which it is judged; a fit then estimates it.",
+    )
+    order: int | None = Field(
+        default=None,
+        description="Order of the term that `smallest_size` is of, where the model absorbs the lower orders; null: "
+        "the first, or the effect has no orders.",
     )
 
 

@@ -279,6 +279,9 @@ class LogTarget(ResponseModel):
     meaning: str = Field(description="What the column holds, in words.")
     unit: str = Field(description="Unit of the column in the recording; empty: none.")
     units: list[str] = Field(description="Units that a log may use for this quantity.")
+    aliases: dict[str, str] = Field(
+        default_factory=dict, description="Other names of these units, in small letters, with the name in `units`."
+    )
 
 
 class LogTrace(ResponseModel):
@@ -314,7 +317,8 @@ class LogPreview(ResponseModel):
     )
     problems: list[str] = Field(description="Everything that prevents the import; empty: the file can be imported.")
     warnings: list[DataWarning] = Field(
-        description="What is wrong with single rows and readings; those with `may_leave_out` can be left out by the "
+        description="What is wrong with the recording that the file becomes: rows, readings, and the gain against the "
+        "table; those with `may_leave_out` can be left out by the "
         "field `leave_out` of the import, by their kind `what`."
     )
     unused: list[str] = Field(description="Columns of the file that are not used.")

@@ -48,7 +48,7 @@ WORKER_MODULES = (
     "blosc2", "pyarrow.csv", "pyarrow.parquet", "labctl.plots", "labctl.processes.remote_bench",
     "labctl.services.commands.computed", "labctl.services.commands.registry",
     "labctl.services.criticism.next_experiment", "labctl.services.criticism.evaluation", "labctl.services.lab_service",
-    "labctl.services.simulation.visibility", "labctl.store.repositories.recordings",
+    "labctl.services.criticism.planned_visibility", "labctl.store.repositories.recordings",
 )  # fmt: skip
 
 

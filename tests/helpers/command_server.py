@@ -30,7 +30,8 @@ MODULES = (
     "labctl.plots", "labctl.processes.bench_process", "labctl.processes.supervisor", "labctl.processes.web_process",
     "labctl.services.commands.computed", "labctl.services.commands.open",
     "labctl.services.commands.registry", "labctl.services.criticism.evaluation",
-    "labctl.services.criticism.next_experiment", "labctl.services.lab_service", "labctl.services.simulation.visibility",
+    "labctl.services.criticism.next_experiment", "labctl.services.criticism.planned_visibility",
+    "labctl.services.lab_service",
 )  # fmt: skip
 
 #: Exit status of a process whose output could not be written at its end, as Python's own.

@@ -11,6 +11,7 @@ import {
 } from "../../labctl/web/static/js/bench/campaign_history.js";
 import { planSteps, positionBands, setPointCourse } from "../../labctl/web/static/js/campaigns/plan_steps.js";
 import { canResume, hasEnded, isRunning, stateKind, stateText } from "../../labctl/web/static/js/campaigns/states.js";
+import { visibilityGroups } from "../../labctl/web/static/js/campaigns/visibility.js";
 import { withButtonNamed } from "../../labctl/web/static/js/campaigns/draft_text.js";
 
 test("what a campaign permits is what the service says of it", () => {
@@ -98,4 +99,22 @@ test("a draft names the button that puts it in force, not the command", () => {
     withButtonNamed(text),
     "It is not certified; the button “Certify: put in force” on the page of the unit puts it in force.",
   );
+});
+
+test("an effect of the model is estimated; one that it absorbs, or that is not excited, cannot be detected", () => {
+  const rows = /** @type {any[]} */ ([
+    { effect: "bias", visible: false, share: 0, why: "schedule", in_model: true },
+    { effect: "scale_factor_even", visible: true, share: 0.2, in_model: true, order: 4 },
+    { effect: "dead_band", visible: true, share: 0.9, in_model: false },
+    { effect: "time_delay", visible: false, share: 0, why: "schedule", in_model: false },
+    { effect: "warm_up", visible: false, share: 0.1, why: "schedule", in_model: false },
+    { effect: "quantization", visible: false, share: 0, why: "channel", in_model: false },
+  ]);
+  const names = Object.entries(visibilityGroups(rows)).map(([group, some]) => [group, some.map((row) => row.effect)]);
+  assert.deepEqual(Object.fromEntries(names), {
+    seen: ["dead_band", "scale_factor_even"],
+    estimated: ["bias"],
+    absorbed: ["time_delay"],
+    unseen: ["warm_up", "quantization"],
+  });
 });

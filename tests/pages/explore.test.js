@@ -20,7 +20,7 @@ import {
 } from "../../labctl/web/static/js/explore/dataset_rows.js";
 import { residualText, usualRecording, usualVersion } from "../../labctl/web/static/js/explore/chosen_recordings.js";
 import { sharedReasons } from "../../labctl/web/static/js/explore/experiment_reasons.js";
-import { cellsText, mapCells } from "../../labctl/web/static/js/explore/residual_cells.js";
+import { cellText, cellsText, mapCells } from "../../labctl/web/static/js/explore/residual_cells.js";
 
 test("a selection is written as ranges and read again", () => {
   const numbers = [3, 1, 2, 20, 7, 8];
@@ -44,6 +44,7 @@ test("times are in hours", () => {
 
 const map = {
   dataset: [1, 2, 3],
+  temperature_c: [20.1, 19.9, 40.2],
   rate_level_dps: [10, 10, -10],
   temperature_level_c: [20, 20, 40],
   over_floor: [2, 4, -12],
@@ -65,6 +66,12 @@ test("data sets of the same rate and temperature share a cell", () => {
       [-10, [3], -12],
     ],
   );
+});
+
+test("a cell of one data set has its own temperature, of several that of the row", () => {
+  const [two, one] = mapCells(map).cells.map((cell) => cellText(cell, "z").split("<br>"));
+  assert.deepEqual(two, ["10 deg/s, row 20 °C, z up", "3.0 times the noise floor", "data set 1, 2"]);
+  assert.equal(one[0], "−10 deg/s, 40.2 °C, z up");
 });
 
 test("how wide a row of temperatures is, is said where it is not nothing", () => {

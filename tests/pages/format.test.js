@@ -182,6 +182,8 @@ test("effects in a sentence of the service are written as their links are", () =
     format.inWords("scale_factor_odd (Scale factor odd (cubic)); or scale_factor_odd (Cubic (odd) error)", ids),
     "scale factor odd (cubic); or scale factor odd (Cubic (odd) error)",
   );
+  const simple = format.inWords("Missing: saturation (Saturation (input rate limit)).", ["saturation"]);
+  assert.equal(simple, "Missing: saturation (input rate limit).");
   assert.equal(format.inWords("nothing", []), "nothing");
 });
 

@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { isLog } from "../../labctl/web/static/js/recordings/file_input.js";
-import { entryOf, withKey, withTarget, withUnit } from "../../labctl/web/static/js/recordings/log_map.js";
+import { entryOf, withFact, withKey, withTarget, withUnit } from "../../labctl/web/static/js/recordings/log_map.js";
 
 const MAP = { serial: "A", columns: { gyro_x: { from: "Gx", unit: "deg/s" }, t_s: { from: 3, unit: "ms" } } };
 
@@ -42,4 +42,11 @@ test("one file that is no recording.toml is a log", () => {
   assert.equal(isLog([{ name: "flight.csv" }]), true);
   assert.equal(isLog([{ name: "recording.toml" }]), false);
   assert.equal(isLog([{ name: "recording.toml" }, { name: "points.csv" }]), false);
+});
+
+test("facts of the unit are further keys of recording.toml, and none is left empty", () => {
+  const stated = withFact(withFact(MAP, "technology", "fog"), "model", "DSP-3000");
+  assert.deepEqual(stated.info, { technology: "fog", model: "DSP-3000" });
+  assert.deepEqual(withFact(stated, "model", "").info, { technology: "fog" });
+  assert.deepEqual(withFact(withFact(stated, "model", ""), "technology", ""), MAP);
 });

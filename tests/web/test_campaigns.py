@@ -52,6 +52,9 @@ def assert_effects_are_counted(service: Service, page: Page) -> None:
     expect(card).to_contain_text(f"This plan can detect {len(able)} of {len(effects) - 1} effects")
     expect(card).to_contain_text("A surface over rate and temperature is a form of a model, not a cause")
     expect(card.locator(".detectable-effects li")).to_have_count(len(able))
+    estimated = [row["effect"] for row in rows if not row["visible"] and row["in_model"]]
+    expect(card).to_contain_text(f"; {len(estimated)} are part of the model of a first fit, which estimates them.")
+    expect(card.locator(".detectable-effects")).to_contain_text("scale factor even, order 4")
     links = card.locator("a[href^='/effects/']").evaluate_all("all => all.map((each) => each.pathname.split('/')[2])")
     assert sorted(links) == sorted(row["effect"] for row in rows)
 
@@ -199,6 +202,35 @@ def test_a_plan_for_a_unit_without_a_bench_says_that_another_unit_is_simulated(
         (made,) = serving.get("/api/recordings")
         assert made["serial"] != "OSU-FOG-2024"
         expect(page.get_by_text(f"Recording 1 of the simulated unit {made['serial']}")).to_be_visible()
+        page.close()
+    finally:
+        serving.stop()
+
+
+@pytest.mark.slow
+def test_a_next_experiment_is_judged_beside_its_version(tmp_path: Path, chromium: Browser) -> None:
+    """The plan says what it was proposed for, and its effects are those beside the model of that version."""
+    from playwright.sync_api import expect
+
+    serving = Service(tmp_path, bench="triaxial-sim")
+    serving.start()
+    try:
+        serving.post("/api/recordings/example", {"name": "osu-fog"})
+        unit = "/api/units/OSU-FOG-2024/calibrations"
+        serving.post(unit, {"model": "bias_scale"})
+        (first, *_) = serving.get(f"{unit}/1/criticism")["experiments"]
+        page = chromium.new_page()
+        page.goto(f"{serving.url}/explore?unit=OSU-FOG-2024&version=1")
+        page.get_by_role("link", name="Next experiment").click()
+        card = page.get_by_role("region", name="Effects that the plan can detect")
+        suspects = ", ".join(each.replace("_", " ") for each in first["separates"])
+        expect(card).to_contain_text(f"Proposed to distinguish {suspects}.")
+        assert page.url.endswith("unit=OSU-FOG-2024&version=1")
+        expect(card).to_contain_text("With the recordings of OSU-FOG-2024, version 1, this plan can detect")
+        detected = card.locator(".detectable-effects")
+        expect(detected).to_contain_text("scale factor odd")
+        expect(detected).to_contain_text("sine response")
+        expect(card).to_contain_text("part of the model of version 1")
         page.close()
     finally:
         serving.stop()

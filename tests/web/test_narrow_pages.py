@@ -71,4 +71,4 @@ def test_two_versions_stand_below_each_other_with_one_scale_and_a_card_has_no_em
     assert (unit["batch"], unit["due"]) == ("", None)
     shown = [cell.get_attribute("data-title") for cell in row.locator("td").all() if cell.is_visible()]
     assert "Versions" in shown
-    assert not {"Batch", "Verdict", "Due"} & set(shown)
+    assert not {"Batch", "Verdict when certified", "Due"} & set(shown)

@@ -55,7 +55,7 @@ def test_a_sheet_states_what_was_fitted_and_how_its_figures_and_coefficients_dif
         row = sheet.get_by_role("row").filter(has_text=name)
         expect(row).to_contain_text("recording 1")
         expect(row).not_to_contain_text("not measured")
-    row = sheet.get_by_role("row").filter(has_text="Scale factor, output over rate")
+    row = sheet.get_by_role("row").filter(has_text="Scale factor, relative to the nominal one")
     expect(row).to_contain_text("slope of the best straight line")
     expect(row).to_contain_text("(scale factor −0.0279253 arb per deg/s, 0 arb at rest)")
     expect(card).not_to_contain_text("Data sheet of")  # that name is of the maker's

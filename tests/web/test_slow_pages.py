@@ -85,3 +85,21 @@ def test_a_page_that_was_refused_for_a_while_comes_by_itself(
     expect(there).to_be_visible()
     assert refused < 0
     faults.clear()  # the browser itself logs each refusal
+
+
+@pytest.mark.slow
+def test_an_answer_that_is_followed_is_read_to_its_end(service: Service, visit: Callable[..., Page]) -> None:
+    """A stream that a page leaves at its answer is a failed request in the console of the browser."""
+    from playwright.sync_api import expect
+
+    made = service.post("/api/recordings/simulated", {"recipe": "short"})
+    fit = {"recording": made["recording"], "effects": ["bias", "scale_factor"]}
+    service.post("/api/units/FOG-0001/calibrations", fit)
+    page = visit("/effects")
+    ended: list[tuple[bool, str]] = []
+    page.on("requestfailed", lambda request: ended.append((False, request.url)))
+    page.on("requestfinished", lambda request: ended.append((True, request.url)))
+    page.goto(f"{service.url}/explore?unit=FOG-0001")
+    expect(page.get_by_role("region", name="Verdict")).to_be_visible()
+    page.wait_for_load_state("networkidle")
+    assert [is_whole for is_whole, url in ended if "/criticism/events" in url] == [True]

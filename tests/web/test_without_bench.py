@@ -49,7 +49,7 @@ def test_what_a_certificate_lacks_is_said_before_it_is_asked_for(visit: Callable
     page = visit(f"/units/{UNIT}", size=SCREEN)
     certificate = page.get_by_role("group", name="Certificate of version 2")
     expect(certificate).to_contain_text("No certificate can be issued. Missing: reference standards")
-    expect(certificate).to_contain_text("no order can state it")
+    expect(certificate).to_contain_text("the order of a certificate cannot state it")
     expect(page.get_by_role("button", name="Issue certificate")).to_have_count(0)
     row = page.get_by_role("row").filter(has=page.get_by_role("button", name="Certify"))
     row.get_by_text("What it needs").click()

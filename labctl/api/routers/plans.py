@@ -8,11 +8,11 @@ from labctl.answers.design import DesignRequest, DesignResponse, EvaluateRequest
 from labctl.answers.plans import PlannedResponse, PlanRequest, RecipeResponse
 from labctl.api.computation import while_connected
 from labctl.api.dependencies import ServiceDep
+from labctl.services.criticism.planned_visibility import planned
 from labctl.services.design.design import designed
 from labctl.services.design.evaluation import evaluated
 from labctl.services.planning import planner as services
 from labctl.services.schedule.planned_start import planned_start
-from labctl.services.simulation.visibility import planned
 
 router = APIRouter(prefix="/api", tags=["campaigns"])
 

@@ -116,21 +116,31 @@ def plan(
             help="Also list the effects that the plan can and cannot detect, with the smallest detectable size.",
         ),
     ] = False,
+    unit: Annotated[
+        str | None,
+        typer.Option(
+            "--unit",
+            metavar="SERIAL",
+            help="With --visibility: judge the plan as a next experiment for this unit, together with the recordings "
+            "of its version.",
+        ),
+    ] = None,
+    version: Annotated[int | None, typer.Option("--version", help="Version of --unit; default: its newest.")] = None,
     as_json: Json = False,
     database: Database = None,
 ) -> None:
     """Show the steps of a campaign and how long it takes, by earlier campaigns on the bench if any. Nothing moves."""
     from instruments.clock import SystemClock
     from labctl.services.benches.stop_rules import check_stop_on
+    from labctl.services.criticism.planned_visibility import looking
     from labctl.services.planning.plan_answer import describe_plan
     from labctl.services.read_access import open_readable
     from labctl.services.schedule.planned_start import planned_start
-    from labctl.services.simulation.visibility import visibility as look
 
     with one_clear_line():
         start = planned_start(None, None, None, SystemClock().utc())
         with open_readable(database) as store:
-            seen = look if visibility else None
+            seen = looking(store, unit, version) if visibility else None
             answer = describe_plan(recipe, bench, clip=clip, look=seen, start=start, store=store, check=check_stop_on)
     if as_json:
         print_json(answer)

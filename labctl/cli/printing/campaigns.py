@@ -53,17 +53,20 @@ def print_plan(answer: PlanResponse) -> None:
         if line.visible:
             shown = shown_unit(line.unit, line.effect)
             smallest = format_number(shown.scaled(line.smallest_size), 2)
-            rows.add_row(line.effect, format_number(line.share, 2), smallest, shown.unit)
+            name = line.effect if line.order is None else f"{line.effect}, order {line.order}"
+            rows.add_row(name, format_number(line.share, 2), smallest, shown.unit)
     console.print(rows)
     hidden = table("\nand what not", "effect", "because of", "experiment that would detect it")
     for line in answer.visibility:
         if not line.visible:
-            hidden.add_row(line.effect, _hidden_by(line), line.experiment)
+            hidden.add_row(line.effect, _hidden_by(line), "" if line.in_model else line.experiment)
     console.print(hidden)
 
 
 def _hidden_by(line: Visibility) -> str:
     """Return why a plan cannot detect an effect: channel, schedule, technology, or how large it would have to be."""
+    if line.in_model:
+        return "nothing: the model has it, and a fit estimates it"
     if line.why == "channel":
         return f"no channel {', '.join(line.needs)}"
     if line.why == "technology":

@@ -90,6 +90,6 @@ def _print_tilted(tilted: TiltedDesign) -> None:
 def _print_bound(bound: DesignBound) -> None:
     console.print(
         f"  at best {bound.bound_h:.2g} h: {bound.heat_h:.2g} h of ramps and mountings, {bound.noise_h:.2g} h of "
-        f"readings against white noise; the chosen recipe takes {bound.ratio:.2g} times as long",
+        f"readings to average the white noise; the chosen recipe takes {bound.ratio:.2g} times as long",
         soft_wrap=True,
     )

@@ -43,7 +43,7 @@ class AxisComparison:
 def compare_axis(data: ReducedRecording, design: Design, axis: str) -> AxisComparison:
     """Return the evidence for every option of one axis, with the scatter estimated from the data."""
     y = data.error_dps(axis)
-    white, noises = _noise_of(data, design, y, axis)
+    white, noises = noise_of(data, design, y, axis)
     explained = np.zeros_like(y)
     means: MeansByNoise | None = None
     for estimate in range(2):
@@ -65,7 +65,7 @@ def _explained(design: Design, axis_evidence: AxisEvidence, option: int) -> NDAr
     return np.asarray(design.options[option].rows @ coefficients)
 
 
-def _noise_of(data: ReducedRecording, design: Design, y: NDArray[np.float64], axis: str) -> tuple[Array, list[Noise]]:
+def noise_of(data: ReducedRecording, design: Design, y: NDArray[np.float64], axis: str) -> tuple[Array, list[Noise]]:
     """Return the white variance of each mean, (m,) (deg/s)^2, and the drifts to average over."""
     stability = data.info.stability_dps
     white_var = data.white_var

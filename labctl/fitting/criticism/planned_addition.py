@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 from labctl.answers.recording_head import Motion
 from labctl.errors import BadInput
 from labctl.fitting.criticism.candidates import base_rows
-from labctl.fitting.criticism.reduction import ReducedRecording
+from labctl.fitting.criticism.model_comparison import design_of, noise_of
+from labctl.fitting.criticism.reduction import ReducedRecording, reduce_recording
+from labctl.fitting.criticism.visibility import Schedule, schedule_beside
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.data.joined import APART_S, COUNTED, WITH_TABLE_RATE
 from labctl.fitting.data.rate_profile import profiles_in_turn
@@ -24,6 +26,7 @@ from labctl.fitting.data.temperature.levels import temperature_levels
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.temperature import LagrangeTable
 from labctl.fitting.numeric.arrays import Array
+from labctl.recording import Recording
 from labctl.recording.columns import RECORDING, WITHIN_S
 from labctl.recording.positions import comparable
 
@@ -63,6 +66,25 @@ def with_planned(measured: ReducedRecording, planned: ReducedRecording, model: E
     )
     _refuse_between_nodes(together, model)
     return _with_predicted(together, len(measured), model)
+
+
+def schedule_with_planned(measured: Recording, planned: Recording, model: ErrorModel) -> Schedule:
+    """Return the schedule of a recording and, behind it, a planned one, beside the model of a version.
+
+    Raises BadInput where the two cannot be fitted together, NotEnoughData.
+    """
+    model = model.forward()
+    first, second = (reduce_recording(each, outliers=False) for each in (measured, planned))
+    if lacking := sorted(set(map(str, first.info.axes)) - set(map(str, second.info.axes))):
+        raise BadInput(
+            f"the unit of the plan has no output {', '.join(lacking)}, which {first.info.serial} has; plan on a bench "
+            "whose unit has the same outputs"
+        )
+    if first.white_var is None:  # means alone: the scatter beside the model is their noise
+        designs = {axis: design_of(first, model, axis, {}) for axis in map(str, first.info.axes)}
+        white = {axis: noise_of(first, each, first.error_dps(axis), axis)[0] for axis, each in designs.items()}
+        first = replace(first, white_var=white)
+    return schedule_beside(with_planned(first, second, model), model)
 
 
 def may_be_joined(measured: Motion, planned: Motion) -> bool:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -24,6 +25,7 @@ from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.effects import CATALOGUE, Effect
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.presets import usual_model
+from labctl.fitting.models.temperature import Constant
 from labctl.recording import Recording
 
 #: An effect of which less than this share is visible beside the model cannot be shown by the schedule.
@@ -32,6 +34,10 @@ MIN_VISIBLE = 0.15
 DETECTABLE_Z = 5.0
 #: Contains several other effects, and so is never what is missing.
 NEVER_MISSING = "rate_temperature_surface"
+#: What it contains: powers of rate and temperature.
+IN_SURFACE = frozenset(
+    {"bias", "bias_temperature", "scale_factor", "scale_factor_temperature", "scale_factor_even", "scale_factor_odd"}
+)
 
 
 @dataclass(frozen=True)
@@ -42,6 +48,7 @@ class Schedule:
     designs: Mapping[str, Design]  #: by axis
     left: Mapping[str, EliminatedBase]  #: by axis
     slices: Mapping[str, list[slice]]  #: by axis
+    in_model: frozenset[str]  #: effects that are part of the model
 
     def options(self, axis: str) -> list[tuple[CandidateShape, slice]]:
         """Return every shape of every effect on one axis, with its place in the Gram matrix."""
@@ -60,6 +67,8 @@ class EffectVisibility:
     why: Literal["channel", "schedule", "size", "technology"] | None = None  #: what hides it, or why there is none
     needs: tuple[str, ...] = ()  #: channels that are not logged
     experiment: str = ""  #: what would show it
+    in_model: bool = False  #: the effect is part of the model beside it, which estimates it
+    order: int | None = None  #: of the term that `smallest_size` is of, where the model absorbs the lower ones
 
 
 def schedule_of(recording: Recording, model: ErrorModel | None = None) -> Schedule:
@@ -68,8 +77,11 @@ def schedule_of(recording: Recording, model: ErrorModel | None = None) -> Schedu
     `model` (default: the published one for such a recording) is the base beside which effects stand. Raises
     NotEnoughData where the recording cannot determine it.
     """
-    data = reduce_recording(recording, outliers=False)
-    model = model or usual_model(fit_data_of(recording))
+    return schedule_beside(reduce_recording(recording, outliers=False), model or usual_model(fit_data_of(recording)))
+
+
+def schedule_beside(data: ReducedRecording, model: ErrorModel) -> Schedule:
+    """Return the schedule of a reduced recording beside a model. Raises NotEnoughData."""
     info = data.info
     if data.white_var is None:
         raise NotEnoughData(
@@ -86,14 +98,23 @@ def schedule_of(recording: Recording, model: ErrorModel | None = None) -> Schedu
         designs[axis] = design
         eliminated_by_axis[axis] = eliminate_base(design, no_output, white, scale, [drift])[0]
         slices[axis] = slices_of(design.options)
-    return Schedule(data, designs, eliminated_by_axis, slices)
+    return Schedule(data, designs, eliminated_by_axis, slices, _parts_of(model))
+
+
+def _parts_of(model: ErrorModel) -> frozenset[str]:
+    """Return the effects that a model estimates: its terms, and what a surface or a table over temperature contains."""
+    terms = frozenset(model.effect_ids)
+    over_temperature = () if isinstance(model.temperature, Constant) else (f"{each}_temperature" for each in terms)
+    return terms.union(over_temperature, IN_SURFACE if NEVER_MISSING in terms else ()) & frozenset(CATALOGUE)
 
 
 def effect_visibilities(schedule: Schedule) -> list[EffectVisibility]:
     """Return every effect of the catalogue with its visible share and smallest detectable size, most visible first."""
     absent = untestable_channels(schedule.data)
     visibilities = [
-        _of_effect(schedule, effect_id, absent.get(effect_id)) for effect_id in CATALOGUE if effect_id != NEVER_MISSING
+        replace(_of_effect(schedule, effect_id, absent.get(effect_id)), in_model=effect_id in schedule.in_model)
+        for effect_id in CATALOGUE
+        if effect_id != NEVER_MISSING
     ]
     return sorted(visibilities, key=lambda v: -v.share)
 
@@ -103,6 +124,7 @@ def _of_effect(schedule: Schedule, effect_id: str, absent: list[str] | None) -> 
         return EffectVisibility(effect_id, False, 0.0, why="channel", needs=tuple(absent))
     share = 0.0
     sizes: dict[str, float] = {}
+    orders: dict[str, int | None] = {}
     for axis in schedule.designs:
         for option, option_rows in schedule.options(axis):
             if option.candidate != effect_id:
@@ -115,6 +137,7 @@ def _of_effect(schedule: Schedule, effect_id: str, absent: list[str] | None) -> 
             best = int(np.argmax(norms))
             size = DETECTABLE_Z / max(float(norms[best]), 1e-300)
             sizes[option.units[best]] = min(size, sizes.get(option.units[best], np.inf))
+            orders[option.units[best]] = _further_order(option, best)
     if share < MIN_VISIBLE:
         return EffectVisibility(effect_id, False, share, why="schedule", experiment=CATALOGUE[effect_id].experiment)
     unit_symbol = next(iter(sizes), "")  # of the lowest order that is visible
@@ -123,9 +146,19 @@ def _of_effect(schedule: Schedule, effect_id: str, absent: list[str] | None) -> 
     if largest == 0:
         return EffectVisibility(effect_id, False, share, why="technology")
     if smallest is not None and smallest > largest:
-        experiment = CATALOGUE[effect_id].experiment
-        return EffectVisibility(effect_id, False, share, smallest, unit_symbol, "size", experiment=experiment)
-    return EffectVisibility(effect_id, True, share, smallest, unit_symbol)
+        experiment, order = CATALOGUE[effect_id].experiment, orders.get(unit_symbol)
+        return EffectVisibility(
+            effect_id, False, share, smallest, unit_symbol, "size", experiment=experiment, order=order
+        )
+    return EffectVisibility(effect_id, True, share, smallest, unit_symbol, order=orders.get(unit_symbol))
+
+
+def _further_order(option: CandidateShape, column: int) -> int | None:
+    """Return the order of a column of a polynomial; None for the first, whose unit is that of the effect."""
+    of_order = re.search(r"_[rt](\d+)$", option.names[column])
+    if column == 0 or of_order is None or option.units[column] == option.units[0]:
+        return None
+    return int(of_order[1])
 
 
 def not_testable(comparison: Comparison, catalogue: Mapping[str, Effect]) -> list[NotTestable]:

@@ -65,7 +65,7 @@ def _ojeda2000(data: FitData) -> tuple[ErrorModel, Rows]:
 
 
 def _yang2018(data: FitData) -> tuple[ErrorModel, Rows]:
-    table = LagrangeTable(_nodes(data, 3, "yang2018"), 3)
+    table = LagrangeTable(_nodes(data, YANG_LEVELS, "yang2018"), YANG_LEVELS)
     return ErrorModel("yang2018", ALIGNED, "rate", table, _centre(data)), _all(data)
 
 
@@ -235,6 +235,8 @@ def unchanged(model: ErrorModel) -> Preset:
     return Preset(model.name, lambda data: (model, _all(data)))
 
 
+#: Temperatures that yang2018 interpolates between.
+YANG_LEVELS = 3
 #: A parabola of the bias takes more different temperatures than it has coefficients beside the constant.
 BIAS_LEVELS = 2
 
@@ -249,9 +251,16 @@ def usual_model(data: FitData) -> ErrorModel:
     elif not np.any(data.channels.table_rate_dps()):
         name = "bias_temperature" if data.distinct_temperatures() > BIAS_LEVELS else "bias"
     else:
-        name = "yang2018" if len(data.info.axes) > 1 and data.levels is not None else "ojeda2000"
+        name = _usual_on_a_table(data)
     model, _ = preset_for(name, []).build(data)
     return changed(model).build(data)[0]
+
+
+def _usual_on_a_table(data: FitData) -> str:
+    """Return the model of a first fit to rates of a table; a table over the temperature needs its levels."""
+    if len(data.info.axes) == 1 or data.levels is None:
+        return "ojeda2000"
+    return "yang2018" if len(level_means(data.temperature_c, data.levels)) >= YANG_LEVELS else "bias_scale"
 
 
 def _custom(terms: tuple[Term, ...], data: FitData) -> ErrorModel:

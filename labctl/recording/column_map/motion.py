@@ -60,7 +60,7 @@ def free_motion(columns: Columns, movement: Movement, t_s: Array, at_rest: Seque
 def _named(findings: Sequence[Finding]) -> str:
     findings_text = "; ".join(f"{finding.what}: {finding.where}: {finding.said}" for finding in findings[:MAX_NAMED])
     more = f"; and {len(findings) - MAX_NAMED} more" if len(findings) > MAX_NAMED else ""
-    return f". Taken to rest, its readings have this wrong: {findings_text}{more}" if findings else ""
+    return f". If the unit rested, this is wrong with its readings: {findings_text}{more}" if findings else ""
 
 
 def missing_columns(info: RecordingInfo, columns: Columns) -> list[str]:

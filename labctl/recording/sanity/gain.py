@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from labctl.answers.output_units import RATE_UNITS
 from labctl.answers.recording_head import OutputUnit
 from labctl.recording.positions import Position
 from labctl.recording.sanity.finding import Finding
@@ -153,18 +154,33 @@ def _size(summary: Summary, axis: str, signed: list[tuple[str, float, Response]]
         yield Finding("no_response", "certain", place_text, text, gain, "1", EXPECTED, do)
         return
     output = _output_unit(summary, axis)
-    right = f"with [output.{axis}] scale = {output.scale * gain:.6g} the gain is 1"
-    cause = next((f.cause for f in FACTORS if abs(size / f.gain - 1) < NEAR_FACTOR), None)
-    if cause is not None:
-        text = f"the gain (output rate divided by table rate) is {gain:.4g}, near {cause}"
-        yield Finding(
-            "unit", "certain", place_text, text, gain, "1", EXPECTED, f"correct the unit in recording.toml; {right}"
-        )
+    factor = next((f for f in FACTORS if abs(size / f.gain - 1) < NEAR_FACTOR), None)
+    if factor is not None:
+        text = f"the gain (output rate divided by table rate) is {gain:.4g}, near {factor.cause}"
+        do = _right_unit(axis, math.copysign(output.scale * factor.gain, output.scale * gain))
+        yield Finding("unit", "certain", place_text, text, gain, "1", EXPECTED, do)
         return
     odd = POSSIBLE[0] <= size <= POSSIBLE[1]
-    text = f"gain {gain:.4g}" + ("" if odd else ": the output is not in the unit that recording.toml gives")
-    do = f"give unit and scale of the output (raw counts, mV?); {right}"
+    text = f"gain {gain:.4g}" + ("" if odd else ": the output is not in the unit that is stated")
+    do = (
+        f"give unit and scale of the output (raw counts, mV?); with [output.{axis}] scale = "
+        f"{output.scale * gain:.6g} the gain is 1"
+    )
     yield Finding("scale", "likely" if odd else "certain", place_text, text, gain, "1", EXPECTED, do)
+
+
+def _right_unit(axis: str, scale: float) -> str:
+    """Return how to state the unit in which an output is; its own factor, so that the scale factor error remains."""
+    unit = next((name for name, own in RATE_UNITS.items() if math.isclose(own, scale, rel_tol=1e-9)), None)
+    if unit is None:
+        return (
+            f"correct the unit of the output or of the table's rate and import again; with [output.{axis}] scale = "
+            f"{scale:.6g} the output is in the unit that the gain suggests"
+        )
+    return (
+        f'state {unit} as the unit of this output, in the map of the columns or as [output.{axis}] unit = "{unit}" in '
+        "recording.toml, and import again"
+    )
 
 
 def _unsigned(summary: Summary, position: str, response: Response) -> Finding | None:

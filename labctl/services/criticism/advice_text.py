@@ -109,9 +109,18 @@ def _size(name: str, suspect: Suspect, technology: str) -> str:
     return f"{size}, where {shown.number(usual[0], 6)} to {shown.number(usual[1], 6)} is usual for {technology}"
 
 
+#: What is said where effects cannot be distinguished by their size either.
+NO_TECHNOLOGY = (
+    "The technology of the gyro is not stated, so no size of these effects is usual or unusual: import the recording "
+    "again with it (Technology, or technology in recording.toml); it then says which of them such a gyro has."
+)
+
+
 def unusual_sizes(criticism: Criticism) -> list[str]:
     """Return which of the effects that cannot be distinguished would be of an unusual size, where another would not."""
     named, technology = criticism.verdict.indistinguishable, criticism.data.info.technology or ""
+    if criticism.verdict.form == "ambiguous" and not technology:
+        return [NO_TECHNOLOGY]
     suspects = [suspect for suspect in criticism.suspects if suspect.candidate.id in named]
     usual = [suspect.candidate.id for suspect in suspects if suspect.is_usual(technology)]
     unusual = [suspect for suspect in suspects if suspect.is_usual(technology) is False]

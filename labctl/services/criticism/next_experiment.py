@@ -230,7 +230,7 @@ def _why(foreseen: Foreseen, question: OpenQuestion, of: int) -> str:
     expected, leader = foreseen.forecast, question.effects[0]
     told = [name for name in expected.distinguished if name != leader]
     first = (
-        f"{foreseen.hours:.1f} h on the bench are expected to give {expected.information_bit:.2f} of the "
+        f"{foreseen.hours:.2g} h on the bench are expected to give {expected.information_bit:.2f} of the "
         f"{question.entropy_bit:.2f} bit that are missing to know {_asked(question)}: "
         f"{foreseen.bit_per_h:.2g} bit/h with set-up and a person's time"
     )

@@ -132,8 +132,8 @@ def _values(numbers: PointNumbers) -> list[float]:
 
 def _formula(shown: PointNumbers) -> str:
     return (
-        f"residual = output - rate - modelled error = {shown.output_dps:.9g} - {shown.own_rate_dps:.9g} - "
-        f"{shown.modelled_error_dps:.9g} = {shown.residual_dps:.6g} deg/s"
+        f"residual = output - rate - modelled error = {shown.output_dps:.9g} - "
+        f"{_subtrahend(shown.own_rate_dps)} - {_subtrahend(shown.modelled_error_dps)} = {shown.residual_dps:.6g} deg/s"
     )
 
 
@@ -146,3 +146,8 @@ def _summary(recording: int, readings: int, equal: bool | None, difference: floa
         f"Recomputed from {readings} raw readings: not equal, the difference is {difference:.2g} deg/s, the rounding "
         f"{rounding_dps:.2g} deg/s."
     )
+
+
+def _subtrahend(value: float) -> str:
+    """Return a number behind a minus sign; a negative one in brackets."""
+    return f"({value:.9g})" if value < 0 else f"{value:.9g}"

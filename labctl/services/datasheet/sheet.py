@@ -28,7 +28,7 @@ THREE = "a recipe that turns the unit about x, y and z, such as table1-x-table2 
 TEMPERATURES = "a recipe of several temperatures, such as ojeda2000 or table1-x-table2"
 
 
-AT_USUAL = "at the temperature nearest to 25 °C, or over all where they are no levels"
+AT_USUAL = "at the temperature nearest to 25 °C, or over all temperatures where they vary continuously"
 SLOPE = "slope of the best straight line through the output over the true rate, least squares over all rates"
 ALLAN = "by the Allan deviation of the longest section at rest"
 FROM_RUN_TO_RUN = "from one power-on to the next, at one temperature and in one position: standard deviation"
@@ -49,8 +49,8 @@ class Line:
 
 
 LINES = (
-    Line("scale_factor", "Scale factor, output over rate", "1", None, RATES,
-         f"{SLOPE}, {AT_USUAL}; relative to the nominal scale factor"),
+    Line("scale_factor", "Scale factor, relative to the nominal one", "1", None, RATES,
+         f"{SLOPE}, {AT_USUAL}; over the nominal scale factor"),
     Line("scale_factor_nonlinearity", "Scale factor nonlinearity, of full scale", "ppm",
          "scale_factor_nonlinearity_ppm", RATES,
          "largest deviation from that straight line, over its slope and the fastest rate"),
@@ -58,18 +58,18 @@ LINES = (
          "slope of the positive rates minus that of the negative ones, over their mean; both lines have one bias"),
     Line("scale_factor_repeatability", "Scale factor repeatability, turn-on to turn-on", "ppm",
          "scale_factor_repeatability_ppm", "recipe turn-on-20", f"slope of the straight line {FROM_RUN_TO_RUN}"),
-    Line("scale_factor_temperature", "Scale factor temperature sensitivity", "ppm/deg C",
+    Line("scale_factor_temperature", "Scale factor temperature sensitivity", "ppm/K",
          "scale_factor_temperature_ppm_c", TEMPERATURES,
          "change of the slope of the straight line per K, linear over all temperatures"),
     Line("bias", "Bias", "deg/s", "bias_dps", RATES,
          f"output of that straight line at rate 0, {AT_USUAL}; of a unit that was never turned, mean at rest"),
-    Line("bias_temperature", "Bias temperature sensitivity", "deg/s/deg C", "bias_temperature_dps_c", TEMPERATURES,
+    Line("bias_temperature", "Bias temperature sensitivity", "deg/s/K", "bias_temperature_dps_c", TEMPERATURES,
          "change of the bias per K, linear over all temperatures"),
     Line("bias_repeatability", "Bias repeatability, turn-on to turn-on", "deg/s", "bias_repeatability_dps",
          "recipe turn-on-20", f"bias {FROM_RUN_TO_RUN}"),
     Line("g_sensitivity", "Bias sensitivity to specific force", "deg/s/g", "g_sensitivity_dps_g",
          "recipe six-face-tumble", "rests with each axis up and down: least squares on bias and three components"),
-    Line("angle_random_walk", "Angle random walk N", "deg/s/rtHz", "angle_random_walk_dps_rthz",
+    Line("angle_random_walk", "Angle random walk N", "deg/s/sqrt(Hz)", "angle_random_walk_dps_rthz",
          "recipe static-night", ALLAN),
     Line("bias_instability", "Bias instability B", "deg/s", "bias_stability_dps", "recipe static-night", ALLAN),
     Line("rate_random_walk", "Rate random walk K", "deg/s/sqrt(s)", "rate_random_walk_dps_rts",

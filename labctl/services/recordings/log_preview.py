@@ -16,6 +16,7 @@ from labctl.recording.column_map.time_order import in_order_of_time
 from labctl.recording.column_map.units import LSB, QUANTITIES, unit_of_target
 from labctl.recording.columns import COLUMNS
 from labctl.recording.raw_table import RawTable
+from labctl.recording.sanity import findings_of, summarise
 from labctl.recording.sanity.readings import examine
 from labctl.services.recordings.importers import log_with_map
 from labctl.services.recordings.logs import MappedFile
@@ -76,10 +77,13 @@ def preview_log(
 
 
 def _warnings(mapped: MappedFile) -> list[DataWarning]:
-    """Return what is wrong with single rows and readings, as an inspection of the file says it."""
+    """Return what is wrong with rows, readings and data sets, as an inspection of the file says it."""
     _, of_rows = in_order_of_time(mapped.table, mapped.column_map)
-    of_readings = [] if mapped.log is None else examine(mapped.log.recording)
-    findings = [*([] if of_rows is None else [of_rows]), *(finding.finding for finding in of_readings)]
+    findings = [] if of_rows is None else [of_rows]
+    if mapped.log is not None:
+        recording = mapped.log.recording
+        of_readings = [*findings, *(found.finding for found in examine(recording))]
+        findings = findings_of(summarise(recording), recording.environment, of_readings)
     return [warning_of(finding) for finding in findings]
 
 
@@ -121,11 +125,15 @@ def _finite(values: Array) -> list[float | None]:
 
 def _targets() -> list[LogTarget]:
     return [
-        LogTarget(name=column.name, meaning=column.meaning, unit=unit, units=_units(unit))
+        LogTarget(name=column.name, meaning=column.meaning, unit=unit, units=_units(unit), aliases=_aliases(unit))
         for column in COLUMNS
         if column.name not in _NOT_OF_LOGS and not column.name.endswith("_std")
         for unit in [unit_of_target(column.name)]
     ]
+
+
+def _aliases(quantity: str) -> dict[str, str]:
+    return {alias.lower(): unit.name for unit in QUANTITIES.get(quantity, ()) for alias in unit.aliases}
 
 
 def _units(quantity: str) -> list[str]:

@@ -5,15 +5,10 @@ from __future__ import annotations
 from dataclasses import asdict
 
 from instruments.bench_config import BenchFile
-from labctl.answers.plans import PlannedResponse, PlanRequest, Visibility
+from labctl.answers.plans import Visibility
 from labctl.fitting.criticism import Schedule, effect_visibilities, schedule_of
 from labctl.fitting.models.error_model import ErrorModel
-from labctl.services.benches.stop_rules import check_stop_on
-from labctl.services.cache import UNNAMED, compute
-from labctl.services.planning.plan_answer import LocalStart
-from labctl.services.planning.planner import plan_steps
 from labctl.services.simulation.walks import walked
-from labctl.store import Store
 from procedures.planning.plan import Plan
 
 
@@ -24,22 +19,10 @@ def planned_schedule(plan: Plan, bench: BenchFile, model: ErrorModel | None = No
 
 def visibility(plan: Plan, bench: BenchFile) -> list[Visibility]:
     """Return every effect with its visible share and smallest detectable size on a plan, most visible first."""
-    visibilities = effect_visibilities(planned_schedule(plan, bench))
+    return answer_of(planned_schedule(plan, bench))
+
+
+def answer_of(schedule: Schedule) -> list[Visibility]:
+    """Return the effects of a schedule as an answer, most visible first."""
+    visibilities = effect_visibilities(schedule)
     return [Visibility(**{**asdict(one), "needs": list(one.needs)}) for one in visibilities]
-
-
-def planned(
-    store: Store, request: PlanRequest, bench: BenchFile | None, start: LocalStart | None = None
-) -> PlannedResponse:
-    """Plan a recipe on a bench, or on the simulated one that fits it best, and say what the plan could find.
-
-    With `start` the answer says when a person is needed.
-
-    Raises RecipeError, PlanRefused, BadInput.
-    """
-
-    def look(plan: Plan, on: BenchFile) -> list[Visibility]:
-        compute(UNNAMED)
-        return visibility(plan, on)
-
-    return plan_steps(store, request, bench, look, start, check_stop_on)

@@ -11453,7 +11453,7 @@ export interface components {
             problems: string[];
             /**
              * Warnings
-             * @description What is wrong with single rows and readings; those with `may_leave_out` can be left out by the field `leave_out` of the import, by their kind `what`.
+             * @description What is wrong with the recording that the file becomes: rows, readings, and the gain against the table; those with `may_leave_out` can be left out by the field `leave_out` of the import, by their kind `what`.
              */
             warnings: components["schemas"]["DataWarning"][];
             /**
@@ -11517,6 +11517,13 @@ export interface components {
              * @description Units that a log may use for this quantity.
              */
             units: string[];
+            /**
+             * Aliases
+             * @description Other names of these units, in small letters, with the name in `units`.
+             */
+            aliases: {
+                [key: string]: string;
+            };
         };
         /**
          * LogTrace
@@ -12717,6 +12724,16 @@ export interface components {
              * @default false
              */
             visibility?: boolean;
+            /**
+             * Unit
+             * @description Serial number of a unit that the plan is a next experiment for: `visibility` is then that of the plan together with the recordings that its version was fitted to, beside the model of the version.
+             */
+            unit?: string | null;
+            /**
+             * Version
+             * @description Calibration version of `unit`; default: the newest.
+             */
+            version?: number | null;
             /**
              * At
              * @description Intended time of the start, as in `POST /api/campaigns`.
@@ -17084,6 +17101,17 @@ export interface components {
              * @default
              */
             experiment: string;
+            /**
+             * In Model
+             * @description Whether the effect is part of the model beside which it is judged; a fit then estimates it.
+             * @default false
+             */
+            in_model: boolean;
+            /**
+             * Order
+             * @description Order of the term that `smallest_size` is of, where the model absorbs the lower orders; null: the first, or the effect has no orders.
+             */
+            order: number | null;
         };
         /**
          * WatchedLimitResponse

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
 import pytest
@@ -30,6 +31,9 @@ def test_a_preview_of_a_log_stores_nothing(client: TestClient) -> None:
     trace = next(each for each in seen["traces"] if each["name"] == "gyro_x (deg/s)")
     assert len(trace["x"]) == len(trace["low"]) == 300
     assert any(each["name"] == "turn_deg" and "turn" in each["units"] for each in seen["targets"])
+    rate = next(each for each in seen["targets"] if each["name"] == "gyro_z")
+    assert rate["aliases"]["dps"] == "deg/s"  # a page lists the unit of a header once
+    assert set(rate["aliases"].values()) <= set(rate["units"])
     assert client.get("/api/recordings").json() == []
 
 
@@ -51,6 +55,23 @@ def test_problems_are_listed_in_a_preview_and_refused_in_an_import(client: TestC
     info = client.get("/api/recordings/1").json()["info"]
     assert info["started_at"] > "2026"  # of the import, for order
     assert info["date_known"] is False
+
+
+def test_a_wrong_unit_of_the_output_is_said_before_the_import(client: TestClient) -> None:
+    """The map then states the unit, which leaves no such finding, and the scale factor error to the fit."""
+    rows = [
+        (0.1 * k, rate_dps, math.radians(1.003 * rate_dps + 0.01 * (-1) ** k), 25.0)
+        for k, rate_dps in enumerate(rate for rate in (-60, -30, 0, 30, 60) for _ in range(20))
+    ]
+    lines = ["t_s,table_rate_dps,gyro_z (dps),temperature (degC)", *(",".join(map(str, row)) for row in rows)]
+    file = sent("gyro.csv", "\n".join(lines).encode())
+    seen = client.post(PREVIEW, files=file).json()
+    (wrong,) = (each for each in seen["warnings"] if each["what"] == "unit")
+    assert "near pi/180: the output is in rad/s" in wrong["text"]
+    assert "state rad/s as the unit of this output, in the map of the columns" in wrong["text"]
+    seen["column_map"]["columns"]["gyro_z"]["unit"] = "rad/s"
+    again = client.post(PREVIEW, files=file, data={"column_map": json.dumps(seen["column_map"])}).json()
+    assert [each for each in again["warnings"] if each["what"] in {"unit", "scale"}] == []
 
 
 def test_a_ulog_is_imported_with_an_option(client: TestClient, tmp_path: Path) -> None:

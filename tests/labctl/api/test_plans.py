@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -12,8 +13,11 @@ from labctl.services.campaigns.plan_view import _forecast
 from labctl.services.campaigns.preparation import prepare
 from labctl.store import StepRow, Store
 from procedures.recipe.recipe import shipped_recipes
-from tests.helpers.service import service_of
+from tests.helpers.lab import Lab
+from tests.helpers.paths import EXAMPLES
+from tests.helpers.service import open_client, service_of
 
+FOG = "OSU-FOG-2024"
 ENDLESS = """
 format = "labctl-recipe/1"
 name = "endless"
@@ -67,6 +71,39 @@ def test_what_cannot_be_planned_says_why(client: TestClient, body: dict[str, Any
     answer = client.post("/api/plans", json=body)
     assert answer.json()["type"] == f"urn:labctl:problem:{slug}"
     assert says in answer.json()["detail"]
+
+
+MORE_RATES = """format = "labctl-recipe/1"
+name = "more-rates"
+temperatures_c = [37]
+rates_dps = [-100, -90, -80, 0, 80, 90, 100]
+positions = ["z"]
+"""
+
+
+@pytest.mark.slow
+def test_a_next_experiment_is_judged_beside_the_version_that_it_is_for(tmp_path: Path) -> None:
+    """The model of the version is no first model, and its recording has the temperatures that the plan lacks."""
+    lab = Lab(tmp_path)
+    lab.run("import", str(EXAMPLES / "osu-fog"))
+    lab.run("fit", FOG, "--model", "bias_scale")
+    with open_client(lab.database) as client:
+        asked = {"recipe": MORE_RATES, "visibility": True}
+        alone, beside, unknown, recordless = (
+            client.post("/api/plans", json={**asked, **more})
+            for more in ({}, {"unit": FOG, "version": 1}, {"unit": FOG, "version": 7}, {"unit": "NONE"})
+        )
+    first, then = ({row["effect"]: row for row in each.json()["visibility"]} for each in (alone, beside))
+    assert not first["scale_factor_odd"]["visible"]  # the surface of a first fit has it
+    assert then["scale_factor_odd"]["visible"]
+    assert not then["scale_factor_odd"]["in_model"]
+    assert then["bias_temperature"]["in_model"]
+    assert then["warm_up"]["needs"] == ["power_s"]  # which the recording lacks
+    assert (unknown.status_code, recordless.status_code) == (404, 404)
+    recipe = tmp_path / "more-rates.toml"
+    recipe.write_text(MORE_RATES, encoding="utf-8")
+    printed = lab.json("campaign", "plan", str(recipe), "--visibility", "--unit", FOG)
+    assert printed["visibility"] == beside.json()["visibility"]
 
 
 @pytest.mark.slow

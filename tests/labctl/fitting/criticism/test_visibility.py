@@ -57,3 +57,25 @@ def test_every_effect_counts_but_the_surface_which_is_a_form_of_a_model() -> Non
     found = [each.effect for each in effect_visibilities(schedule)]
     assert len(found) == len(set(found))
     assert set(CATALOGUE) - set(found) == {"rate_temperature_surface"}
+
+
+def test_a_term_beyond_those_of_the_model_says_its_order() -> None:
+    """The surface of a first fit absorbs the square of the rate: what can be detected is its fourth power."""
+    bench = load_bench("single-axis-sim")
+    schedule = planned_schedule(make_plan(load_recipe("short"), limits_of(bench)), bench)
+    found = {each.effect: each for each in effect_visibilities(schedule)}
+    even = found["scale_factor_even"]
+    assert (even.visible, even.in_model, even.order, even.unit) == (True, True, 4, "(deg/s)^-3")
+    assert found["scale_factor_asymmetry"].order is None
+    assert found["bias"].in_model
+    unexcited = found["time_delay"]  # nothing changes within a data set
+    assert (unexcited.visible, unexcited.in_model, unexcited.share) == (False, False, 0.0)
+
+
+def test_one_temperature_on_several_axes_has_a_first_model_too() -> None:
+    bench = load_bench("triaxial-sim")
+    recipe = load_recipe("short").model_copy(update={"temperatures_c": (25.0,), "positions": ("x", "y", "z")})
+    schedule = planned_schedule(make_plan(recipe, limits_of(bench)), bench)
+    assert {"bias", "scale_factor", "misalignment"} <= schedule.in_model
+    found = {each.effect: each for each in effect_visibilities(schedule)}
+    assert found["scale_factor_asymmetry"].visible

@@ -77,9 +77,9 @@ def test_three_axes_at_several_readings_per_second_get_no_finding() -> None:
     ("factor", "what", "said", "do"),
     [
         (-1.0, "sign", "gain -1.02", "[output.z] scale = -1"),
-        (np.pi / 180, "unit", "near pi/180: the output is in rad/s", "[output.z] scale = 0.0178"),
-        (180 / np.pi, "unit", "near 180/pi", "[output.z] scale = 58.6"),
-        (3600.0, "unit", "deg/h", "[output.z] scale = 3684"),
+        (np.pi / 180, "unit", "near pi/180: the output is in rad/s", "state rad/s as the unit of this output"),
+        (180 / np.pi, "unit", "near 180/pi", "[output.z] scale = 57.2958 "),
+        (3600.0, "unit", "deg/h", "state deg/h as the unit of this output"),
         (16384.0, "scale", "gain 1.67", "raw counts"),
         (1000.0, "scale", "gain 1024", "mV"),
     ],

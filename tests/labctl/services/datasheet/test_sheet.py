@@ -145,7 +145,7 @@ def test_noise_is_in_the_units_of_the_specification(store: Store, measured: Reco
     info = measured.info.model_copy(update={"kind": "samples", "sample_rate_hz": rate_hz})
     store.recordings.add_import(Recording(info, columns), STARTED)
     found = lines(datasheet(store, measured.info.serial), "angle_random_walk")["x"]
-    assert found.unit == "deg/s/rtHz"
+    assert found.unit == "deg/s/sqrt(Hz)"
     assert found.value == pytest.approx(white, rel=0.1)
 
 

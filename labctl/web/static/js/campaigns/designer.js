@@ -4,7 +4,7 @@ import { post } from "../core/http/api.js";
 import { isAbort, messageOf } from "../core/http/errors.js";
 import { setChildren, h } from "../core/elements.js";
 import { colour, figure } from "../core/figure.js";
-import { count, number } from "../core/format.js";
+import { count, duration, number } from "../core/format.js";
 import { busyIndicator, button, chip, notice, table } from "../core/components.js";
 import { labelledField, option, selectField } from "../core/fields.js";
 import { firstModels } from "../explore/first_models.js";
@@ -157,7 +157,7 @@ function shown(found, taken) {
       ? h(
           "p",
           { class: "small" },
-          `At best ${number(bound.bound_h)} h: ${number(bound.heat_h)} h of ramps and mountings, ${number(bound.noise_h)} h of readings against white noise. The chosen recipe takes ${number(bound.ratio)} times as long.`,
+          `At best ${number(bound.bound_h)} h: ${number(bound.heat_h)} h of ramps and mountings, ${duration(3600 * bound.noise_h)} of readings to average the white noise. The chosen recipe takes ${number(bound.ratio)} times as long.`,
         )
       : null,
     found.tilted ? tiltedText(found.tilted, taken) : null,

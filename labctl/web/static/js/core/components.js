@@ -230,10 +230,27 @@ export function errorPage(error, again) {
     { class: "page" },
     h("h1", {}, what),
     notice("bad", h("p", {}, withCommands(messageOf(error)))),
-    again
-      ? h("div", { class: "row" }, h("button", { class: "button", type: "button", onclick: again }, "Try again"))
-      : null,
+    h("div", { class: "row" }, isMissing(error) ? waysOut(location) : again ? tryAgain(again) : null),
   );
+}
+
+/** @param {unknown} error */
+export const isMissing = (error) => error instanceof Problem && error.status === 404;
+
+/** @param {() => unknown} again */
+const tryAgain = (again) => h("button", { class: "button", type: "button", onclick: again }, "Try again");
+
+/**
+ * Links from the page of something that does not exist, which no second attempt shows.
+ * @param {{ pathname: string, search: string }} place
+ */
+function waysOut({ pathname, search }) {
+  const unit = new URLSearchParams(search).get("unit");
+  const list = /^\/(campaigns|recordings)\//.exec(pathname)?.[1] ?? "units";
+  return [
+    unit ? h("a", { class: "button", href: `/units/${encodeURIComponent(unit)}` }, `Versions of ${unit}`) : null,
+    h("a", { class: "button", href: `/${list}` }, `All ${list}`),
+  ];
 }
 
 /**

@@ -160,9 +160,9 @@ export const idText = (id) => String(id).replaceAll("_", " ");
  * @param {Iterable<string>} ids of effects
  */
 export function inWords(text, ids) {
-  const compound = [...new Set(ids)].filter((id) => id.includes("_"));
-  if (!compound.length) return text;
-  const whole = new RegExp(`(?<![\\w-])(${compound.join("|")})(?![\\w-])( \\(((?:[^()]|\\([^()]*\\))*)\\))?`, "g");
+  const all = [...new Set(ids)];
+  if (!all.length) return text;
+  const whole = new RegExp(`(?<![\\w-])(${all.join("|")})(?![\\w-])( \\(((?:[^()]|\\([^()]*\\))*)\\))?`, "g");
   /** @type {(match: string, id: string, brackets?: string, title?: string) => string} */
   const named = (_, id, brackets = "", title = "") =>
     title.toLowerCase().startsWith(idText(id)) ? idText(id) + title.slice(id.length) : idText(id) + brackets;

@@ -48,11 +48,13 @@ export function matchRoute(routes, path) {
 }
 
 /**
- * The address of a plan of a recipe; with the serial number of the unit that it is for, which may be on no bench.
+ * The address of a plan of a recipe; with the serial number of the unit that it is for, which may be on no bench, and
+ * the version beside whose model and recordings it is judged.
  * @param {string} toml
  * @param {string} [unit]
+ * @param {number} [version]
  */
-export const planAddress = (toml, unit) => `/campaigns/new?${changedQuery("", { toml, unit })}`;
+export const planAddress = (toml, unit, version) => `/campaigns/new?${changedQuery("", { toml, unit, version })}`;
 
 /**
  * A query string with some values changed: "" , null and undefined remove one.

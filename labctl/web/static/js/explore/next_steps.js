@@ -91,10 +91,10 @@ export function nextSteps(given, criticism) {
  * @param {Criticism} criticism
  * @param {string} kind
  */
-function nextExperiment({ unit, hasBench }, { experiments }, kind) {
+function nextExperiment({ unit, hasBench }, { experiments, version }, kind) {
   const plan = experiments.find((each) => each.toml)?.toml;
   if (plan && !hasBench) return recipeToKeep(unit.serial, plan, kind);
-  const href = planAddress(plan ?? "", unit.serial);
+  const href = planAddress(plan ?? "", unit.serial, plan ? version : undefined);
   return h("a", { class: `button ${kind}`, href }, plan ? "Next experiment" : "Plan a campaign");
 }
 

@@ -68,7 +68,7 @@ const facts = (point) =>
     ["Residual", number(point.shown.residual_dps, DIGITS), "deg/s"],
     [
       "Readings",
-      count(point.readings),
+      point.readings ? count(point.readings) : "–", // a mean of the recording has none
       "",
       point.invalid ? `${count(point.invalid)} more are marked as invalid and do not count` : null,
     ],

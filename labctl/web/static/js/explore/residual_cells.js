@@ -1,6 +1,6 @@
 // Cells of the residual map: data sets that share a rate and a temperature.
 
-import { plainNumber } from "../core/format.js";
+import { number, plainNumber } from "../core/format.js";
 
 /** @import { Criticism, RecordingRow, ResidualMap } from "../../../types/api.js" */
 
@@ -33,19 +33,37 @@ export function cellsText(criticism) {
   return `Data sets share a cell where rate and temperature repeat within 0.1 % and 0.25 K${width ? `; temperatures of one row are within ${plainNumber(width, 2)} K` : ""}.`;
 }
 
+/**
+ * A cell in words: the temperature of its data set, of several that of their row.
+ * @param {Cell} cell
+ * @param {string} position
+ */
+export const cellText = ({ rate, temperature, own_c, mean, sets }, position) =>
+  [
+    `${plainNumber(rate)} deg/s, ${sets.length > 1 ? `row ${plainNumber(temperature)}` : plainNumber(own_c)} °C, ${position} up`,
+    `${number(mean, 2)} times the noise floor`,
+    `data set ${sets.slice(0, 6).join(", ")}${sets.length > 6 ? " …" : ""}`,
+  ].join("<br>");
+
 /** @param {readonly number[]} values */
 const sorted = (values) => [...new Set(values)].sort((a, b) => a - b);
 
 /**
  * Measured cells of one map: their rates and temperatures, and each cell's mean score and data sets.
- * @param {Pick<ResidualMap, "dataset" | "rate_level_dps" | "temperature_level_c" | "over_floor">} map
+ * @param {Pick<ResidualMap, "dataset" | "temperature_c" | "rate_level_dps" | "temperature_level_c" | "over_floor">} map
  */
 export function mapCells(map) {
-  /** @type {Map<string, { rate: number, temperature: number, sum: number, sets: number[] }>} */
+  /** @type {Map<string, { rate: number, temperature: number, own_c: number, sum: number, sets: number[] }>} */
   const found = new Map();
   map.dataset.forEach((set, k) => {
     const [rate, temperature] = [map.rate_level_dps[k], map.temperature_level_c[k]];
-    const cell = found.get(`${rate} ${temperature}`) ?? { rate, temperature, sum: 0, sets: [] };
+    const cell = found.get(`${rate} ${temperature}`) ?? {
+      rate,
+      temperature,
+      own_c: map.temperature_c[k],
+      sum: 0,
+      sets: [],
+    };
     found.set(`${rate} ${temperature}`, cell);
     cell.sum += map.over_floor[k];
     cell.sets.push(set);

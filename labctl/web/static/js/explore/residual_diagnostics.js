@@ -29,7 +29,7 @@ const MAX_LISTED = 12;
  */
 const oneFloorText = ({ error: { noise_floor_source: source } }) =>
   source === "repeats" || source === "scatter about a smooth surface"
-    ? " Here it is one number for all data sets, since the recording has no readings within them: where the noise grows with the rate, an error at low rates is larger against the noise than its cell shows, and at high rates smaller."
+    ? " Here the noise floor is one number for all data sets, since the recording has no readings within them: where the noise grows with the rate, an error at low rates is larger against the noise than its cell shows, and at high rates smaller."
     : "";
 
 /** @param {ExploreState} state */

@@ -2,11 +2,10 @@
 
 import { DIVERGING } from "../core/colour_scales.js";
 import { colour, figure } from "../core/figure.js";
-import { number, plainNumber } from "../core/format.js";
 import { datasetRows, distinctLabels } from "./dataset_rows.js";
 import { reachByKeyboard } from "../core/keyboard_points.js";
 import { outlinePoints } from "../core/point_outlines.js";
-import { COLOUR_LIMIT, mapCells } from "./residual_cells.js";
+import { cellText, COLOUR_LIMIT, mapCells } from "./residual_cells.js";
 
 /** @import { ResidualMap } from "../../../types/api.js" */
 /** @import { PlotEvent, PlotLayout } from "../../../types/pages.js" */
@@ -44,13 +43,6 @@ const isPicked = ({ sets }, pick) => sets.some((set) => pick.has(set));
  * @param {Place | null} cursor
  */
 const isUnder = ({ sets }, cursor) => cursor?.sets[0] === sets[0];
-/**
- * @param {Cell} cell
- * @param {string} position
- */
-const cellText = (cell, position) =>
-  `${plainNumber(cell.rate)} deg/s, ${plainNumber(cell.temperature)} °C, ${position} up<br>${number(cell.mean, 2)} times the noise floor<br>data set ${cell.sets.slice(0, 6).join(", ")}${cell.sets.length > 6 ? " …" : ""}`;
-
 /**
  * Cells as a grid, with a faded layer over those within the noise.
  * @param {Cells} found

@@ -27,7 +27,7 @@ export function whyNoneIsNamed({ why_not_named: why, suspects }) {
     : "";
   return why
     ? `${alone} ${why}${unphysical}`
-    : `${alone} Counted, none that is physical is distinguished from noise.${unphysical}`;
+    : `${alone} With this number counted, no physical effect is distinguished from noise.${unphysical}`;
 }
 
 /**
@@ -138,7 +138,13 @@ export function experimentList(criticism, ids) {
             : `; a wrong cause is then named with a probability of ${unbroken(probabilityText(each.names_wrong))}`,
         ),
         own[place] ? h("p", { class: "muted small" }, own[place]) : null,
-        each.toml ? h("a", { class: "button tiny", href: planAddress(each.toml, criticism.serial) }, "Plan it") : null,
+        each.toml
+          ? h(
+              "a",
+              { class: "button tiny", href: planAddress(each.toml, criticism.serial, criticism.version) },
+              "Plan it",
+            )
+          : null,
       ),
     ),
   );

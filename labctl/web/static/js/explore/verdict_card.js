@@ -232,7 +232,7 @@ export function suspectList(state, effects, { onadd, onlaw, explain }) {
                 ],
           ),
           evidenceItem(
-            `Coefficient ± U (95.45 %)${axisNames(criticism).length > 1 ? `, axis ${state.axis}` : ""}`,
+            `Coefficient ± U (k = 2)${axisNames(criticism).length > 1 ? `, axis ${state.axis}` : ""}`,
             coefficientText(s, state.axis),
             usualSize(s, effects),
           ),

@@ -357,6 +357,8 @@ function partingNotice(state, suspect, other, channel, parts) {
   return notice(
     "",
     h("p", {}, `${name} and ${other} part at ${channelTitle(channel)}: ${listed} (marked in the figure).`),
-    plan ? h("a", { class: "button tiny", href: planAddress(plan, state.serial) }, "Plan these rates") : null,
+    plan
+      ? h("a", { class: "button tiny", href: planAddress(plan, state.serial, state.version) }, "Plan these rates")
+      : null,
   );
 }

@@ -87,7 +87,7 @@ export function typeCard(figures, linked) {
       ? h(
           "p",
           { class: "muted small" },
-          `No fleet job has ${missing} any of these units. Next: `,
+          `No fleet job has ${missing} any of these units; versions that were fitted one by one do not count here. Next: `,
           h("code", {}, nextCommand(figures.type, !errors.length)),
         )
       : null,

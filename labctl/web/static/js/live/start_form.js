@@ -106,7 +106,7 @@ export function startForm(bench, serial) {
       "label",
       { class: "row tight" },
       unwatched,
-      "End it, and keep the recording, when no page has followed it for 30 s",
+      "End it, and keep the recording, when it has been open in no page for 30 s",
     ),
     h("div", { class: "row" }, actButton("Begin", begin, { kind: "primary large" })),
   );

@@ -15,7 +15,7 @@ import { mountingWorth } from "../campaigns/mounting_worth.js";
 import { designerCard } from "../campaigns/designer.js";
 import { planChart } from "../campaigns/plan_chart.js";
 import { recipeChoice } from "../campaigns/recipe_choice.js";
-import { visibilityReport } from "../campaigns/visibility.js";
+import { purposeOf, visibilityReport } from "../campaigns/visibility.js";
 
 /** @import { Bench, Plan, Recipe } from "../../../types/api.js" */
 /** @import { Choice } from "../campaigns/recipe_choice.js" */
@@ -47,6 +47,23 @@ function absentNotice(unit, bench, recipe) {
   );
 }
 
+/**
+ * What the experiment was proposed for, where it is one that a version's criticism proposes; null elsewhere.
+ * @param {{ unit?: string, version?: string }} query
+ * @param {string} toml
+ * @param {AbortSignal} signal
+ */
+async function purposeFor({ unit, version }, toml, signal) {
+  if (!unit || !version) return null;
+  const path = { serial: unit, version: Number(version) };
+  try {
+    return purposeOf(await get("/api/units/{serial}/calibrations/{version}/criticism", { path, signal }), toml);
+  } catch (error) {
+    if (isAbort(error)) throw error;
+    return null; // the plan is judged without it
+  }
+}
+
 /** @param {PageContext} context */
 export async function page({ query, signal }) {
   const [all, benches, catalogue] = await Promise.all([
@@ -69,6 +86,9 @@ export async function page({ query, signal }) {
         hide = list;
       })
     : null;
+  // an experiment proposed for a version is judged beside its model, with the recordings that it has
+  const beside = query.unit && query.version ? { serial: query.unit, version: query.version } : null;
+  const judged = beside ? { unit: beside.serial, version: Number(beside.version) } : {};
   const source = () => (choice.name === "own" ? `${(choice.text ?? "").trimEnd()}\n` : choice.name);
 
   async function plan() {
@@ -96,9 +116,12 @@ export async function page({ query, signal }) {
       return;
     }
     try {
-      const answer = await post("/api/plans", { body: { recipe: source(), clip, visibility: true }, signal: given });
+      const [answer, purpose] = await Promise.all([
+        post("/api/plans", { body: { recipe: source(), clip, visibility: true, ...judged }, signal: given }),
+        purposeFor(query, source(), given),
+      ]);
       const visibility = answer.visibility ?? [];
-      setChildren(found, visibilityReport(visibility));
+      setChildren(found, purpose, visibilityReport(visibility, beside));
       hider?.sizes(visibility);
     } catch (error) {
       if (!isAbort(error)) setChildren(found, notice("", messageOf(error)));

@@ -2,7 +2,7 @@
 
 import { get } from "../core/http/api.js";
 import { h, setChildren } from "../core/elements.js";
-import { card, emptyState, pageHeader, cardWithHeader, loadInto } from "../core/components.js";
+import { card, emptyState, isMissing, pageHeader, cardWithHeader, loadInto } from "../core/components.js";
 import { draftsCard } from "../campaigns/drafts.js";
 import { query, updateQuery } from "../core/router.js";
 import { ladderFigure } from "../explore/error_ladder.js";
@@ -23,17 +23,41 @@ import { versionsCard } from "../unit/versions.js";
 
 /** @import { PageContext } from "../../../types/pages.js" */
 
+/**
+ * The page of a unit that a bench carries, and that no campaign has measured yet.
+ * @param {string} serial
+ * @param {string} bench
+ */
+const notMeasured = (serial, bench) =>
+  h(
+    "div",
+    { class: "page" },
+    pageHeader(serial, `On bench ${bench}; not measured yet.`),
+    emptyState(
+      h("p", {}, "A campaign measures it and makes its first recording."),
+      h("p", {}, h("a", { class: "button primary", href: "/campaigns/new" }, "Plan a campaign")),
+    ),
+  );
+
 /** @param {PageContext} context */
 export async function page({ params, signal }) {
   const path = { serial: params.serial };
+  /** @type {Unit} */
+  let unit;
+  try {
+    unit = await get("/api/units/{serial}", { path, signal });
+  } catch (error) {
+    const [bench] = isMissing(error) ? await get("/api/benches", { signal }) : [];
+    if (bench?.units.some(({ serial }) => serial === params.serial)) return notMeasured(params.serial, bench.name);
+    throw error;
+  }
   const calibrations = get("/api/units/{serial}/calibrations", { path, signal });
   // the first figure needs it: it does not wait for the other answers
   const asking = calibrations.then((each) =>
     each.length ? get("/api/units/{serial}/ladder", { path, signal }) : null,
   );
   asking.catch(() => {}); // shown where it is awaited
-  const [unit, rows, history, issued, waiting, sensors, diagnoses] = await Promise.all([
-    get("/api/units/{serial}", { path, signal }),
+  const [rows, history, issued, waiting, sensors, diagnoses] = await Promise.all([
     calibrations,
     get("/api/units/{serial}/certifications", { path, signal }),
     get("/api/units/{serial}/certificates", { path, signal }),

@@ -68,7 +68,7 @@ const unitTable = (units) =>
         cell: (unit) => h("a", { href: `/units/${encodeURIComponent(unit.serial)}` }, unit.serial),
       },
       {
-        title: "Model",
+        title: "Type",
         cell: (unit) => [
           unit.model,
           unit.technology ? h("div", { class: "muted small" }, unit.technology.toUpperCase()) : null,
@@ -86,7 +86,7 @@ const unitTable = (units) =>
           unit.certified_version ? chip(`version ${unit.certified_version}`, "good") : chip("none", "warn"),
       },
       {
-        title: "Verdict",
+        title: "Verdict when certified",
         cell: (unit) => (unit.certified_version ? verdictChip({ verdict: unit.certified_verdict }) : "–"),
       },
       {

@@ -164,7 +164,7 @@ function pageTable(state, rows) {
               ),
         ],
       })),
-      { title: "Readings", number: true, cell: (k) => count(sets.n[k]) },
+      { title: "Readings", number: true, cell: (k) => (state.kind === "samples" ? count(sets.n[k]) : "–") },
       timed ? { title: "Begins after", number: true, cell: (k) => duration(sets.t_from_s[k] ?? NaN) } : null,
     ],
     rows,

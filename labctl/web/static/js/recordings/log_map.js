@@ -63,6 +63,17 @@ export function withKey(map, key, value) {
 }
 
 /**
+ * The map with another fact of the unit, a further key of recording.toml; empty: it is not stated.
+ * @param {MapDocument} map
+ * @param {"model" | "technology"} key
+ * @param {string} value
+ */
+export function withFact(map, key, value) {
+  const info = withKey(map.info ?? {}, key, value);
+  return withKey(map, "info", Object.keys(info).length ? info : null);
+}
+
+/**
  * What is sent with a log, to look at it and to import it alike: its map, and what is left out of it by choice.
  * @param {MapDocument | string | null} map as a document or as text; null: labctl proposes one
  * @param {{ modified_ms: number, options: readonly string[], leaveOut: Iterable<string> }} more

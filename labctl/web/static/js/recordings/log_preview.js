@@ -8,8 +8,9 @@ import { axisColour, colour, figure } from "../core/figure.js";
 import { count, duration } from "../core/format.js";
 import { actButton, busyIndicator, button, notice, table } from "../core/components.js";
 import { labelledField, option, selectField } from "../core/fields.js";
+import { TECHNOLOGIES } from "../effects/labels.js";
 import { choose, leaveOutChoices } from "./leave_out.js";
-import { entryOf, logFields, withKey, withTarget, withUnit } from "./log_map.js";
+import { entryOf, logFields, withFact, withKey, withTarget, withUnit } from "./log_map.js";
 
 /** @import { Imported, LogPreview } from "../../../types/api.js" */
 /** @import { MapDocument } from "./log_map.js" */
@@ -23,6 +24,8 @@ const MOTIONS = [
   ["turns", "turns: by a known angle in each data set"],
   ["poses", "poses: by hand, between rests"],
 ];
+/** What effects a gyro can have, and of which size, depends on its technology. @type {[string, string][]} */
+const KINDS_OF_GYRO = [["", "not stated"], ...Object.entries(TECHNOLOGIES)];
 /** @type {[string, string][]} */
 const DIVISIONS = [
   ["whole", "the whole file is one"],
@@ -216,12 +219,22 @@ function settings(seen, map, look) {
     step: "any",
     onchange: () => look(withKey(map, "sample_rate_hz", Number(rate.value) || null)),
   });
+  /** @type {HTMLInputElement} */
+  const type = h("input", {
+    type: "text",
+    value: map.info?.model ?? "",
+    onchange: () => look(withFact(map, "model", type.value.trim())),
+  });
   const by = map.datasets?.by ?? "whole";
   const columns = seen.columns.map((column) => option(column.name, column.name));
   return h(
     "div",
     { class: "row" },
     labelledField("Serial number", serial),
+    labelledField("Type of the gyro", type, "As its manufacturer names it; certificates and the fleet state it."),
+    selectField("Technology", KINDS_OF_GYRO, map.info?.technology ?? "", (value) =>
+      look(withFact(map, "technology", value)),
+    ),
     selectField("What moved it", MOTIONS, map.motion ?? "", (value) => look(withKey(map, "motion", value))),
     map.columns?.t_s
       ? null
@@ -252,9 +265,11 @@ function columnTable(seen, map, look) {
   /** @param {Row} row */
   function unitCell(row) {
     const found = entry(row);
-    const units = seen.targets.find((each) => each.name === found?.[0])?.units ?? [];
+    const quantity = seen.targets.find((each) => each.name === found?.[0]);
+    const [units, aliases] = [quantity?.units ?? [], quantity?.aliases ?? {}];
     if (!found || !units.length) return "–";
-    const [target, { unit = "", scale }] = found;
+    const [target, { unit: stated = "", scale }] = found;
+    const unit = aliases[stated.toLowerCase()] ?? stated; // dps is deg/s: listed once
     const shown = [option("", row.unit || "not given"), ...units.map((each) => option(each, each))];
     const known = unit === "" || units.includes(unit) ? shown : [...shown, option(unit, unit)];
     /** @type {HTMLInputElement} */
@@ -324,7 +339,7 @@ function plot(seen, map) {
     })),
     layout: {
       xaxis: { title: { text: seen.motion ? "time, s" : "row, or time in s where it is known" } },
-      yaxis: { title: { text: "value in the file" } },
+      yaxis: { title: { text: shown.length > 1 ? "value in the file" : `${shown[0].name}, as in the file` } },
       margin: { l: 70, r: 12, t: 8, b: 46 },
     },
   });
@@ -352,7 +367,7 @@ function asText(seen, look) {
   return h(
     "details",
     {},
-    h("summary", {}, "The map as text: parts, constants and everything else"),
+    h("summary", {}, "The column map as TOML: parts, constants and every other key"),
     text,
     h(
       "div",

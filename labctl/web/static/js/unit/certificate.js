@@ -227,7 +227,7 @@ const LABORATORY = "Laboratory and reference standards come from the bench file.
 /** The fact that the act of certification itself supplies, by its name in the answer. */
 const AUTHORISATION = "authorisation";
 const ORDER_STATES = "Once it is certified, the order of the customer states everything else that a certificate needs.";
-const NO_ORDER = "What is missing belongs to the measurement: no order can state it.";
+const NO_ORDER = "What is missing belongs to the measurement: the order of a certificate cannot state it.";
 
 /** Where the measurement states no laboratory. */
 const NO_LABORATORY = "The measurement states no laboratory, so this form asks for it.";

@@ -10,7 +10,7 @@ import { visitSignal } from "../core/router.js";
 import { askBenchClear, askingButton } from "../bench/actions.js";
 import { diagnosisState, effectsOfRounds, lineOfRound, suspectColumns } from "./diagnosis_rounds.js";
 
-/** @import { Diagnosis } from "../../../types/api.js" */
+/** @import { Bench, Diagnosis } from "../../../types/api.js" */
 
 /** How often a diagnosis that goes on is read again, ms. */
 const POLL_MS = 2000;
@@ -146,14 +146,27 @@ function confirmButtons(diagnosis, again) {
 }
 
 /**
+ * Why this service cannot measure a unit; empty where it can.
+ * @param {string} serial
+ * @param {readonly Bench[]} benches
+ */
+export function cannotMeasure(serial, [bench]) {
+  if (!bench) return NO_EXPERIMENT;
+  const carried = bench.units.map((each) => each.serial);
+  if (!carried.length || carried.includes(serial)) return "";
+  return `Bench ${bench.name} carries ${carried.join(", ")}, and not ${serial}: write ${serial} into the bench file in place of a unit, and start the service again.`;
+}
+
+/**
  * @param {string} serial
  * @param {() => Promise<void>} again
  */
 const startButton = (serial, again) =>
   actButton("Diagnose", async () => {
     const left = visitSignal();
-    if (!(await get("/api/benches", { signal: left })).length) {
-      toast("bad", NO_EXPERIMENT);
+    const reason = cannotMeasure(serial, await get("/api/benches", { signal: left }));
+    if (reason) {
+      toast("bad", reason);
       return;
     }
     const answers = await dialog(

@@ -209,14 +209,18 @@ function keepAnswer(path, { path: parameters, query, signal }) {
  */
 export async function getFollowed(path, { onstage, ...options }) {
   let computed = false;
+  /** @type {Followed["answer"] | null} */
+  let answer = null;
+  // read to its end, which follows the answer: a stream that is left before is a cancelled request
   for await (const { event, data } of eventStream(path, options)) {
     if (event === "stage") {
       computed = true;
       onstage(/** @type {Followed["stage"]} */ (data).stage);
     } else if (event === "answer") {
-      if (computed) keepAnswer(path, options);
-      return /** @type {Followed["answer"]} */ (data);
+      answer = /** @type {Followed["answer"]} */ (data);
     } else if (event === "problem") throw new Problem(/** @type {Followed["problem"]} */ (data));
   }
-  throw new Unreachable();
+  if (!answer) throw new Unreachable();
+  if (computed) keepAnswer(path, options);
+  return answer;
 }
