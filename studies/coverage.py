@@ -2,10 +2,12 @@
 
 Every seed is another unit on another campaign of `table1-x-table2`, with noise, drift, the Earth, self-heating and the
 table's step errors. A fit whose uncertainties are honest has 68 % of its errors within one and 95 % within two.
+`LABCTL_STUDY_UNITS` is the number of seeds.
 """
 
 from __future__ import annotations
 
+import os
 from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
@@ -20,7 +22,7 @@ from labctl.services.planning.loading import limits_of, load_bench, load_recipe
 from labctl.services.simulation.plan_simulation import simulate
 from procedures.planning.plan import make_plan
 
-SEEDS = 20
+SEEDS = int(os.environ.get("LABCTL_STUDY_UNITS", "120"))
 RATE_HZ = 10.0
 
 

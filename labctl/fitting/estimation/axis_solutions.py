@@ -163,14 +163,16 @@ def _converged(
 ) -> tuple[AxisDesign, Solution, TimeErrors | None]:
     """Return the design at the solution, the solution, and the errors of the reference's time that are in it.
 
-    Laws are solved by Gauss-Newton steps at one noise, and their uncertainty is averaged over the noise. A delay and a
-    bandwidth are laws of their own effect, and every other effect sees the rate that comes through both.
+    Laws are solved by Gauss-Newton steps at one noise, which is that at their solution, and their uncertainty is
+    averaged over the noise. A delay and a bandwidth are laws of their own effect, and every other effect sees the rate
+    that comes through both.
     """
     response = first_response(data, model, axis)
     data = data.through(response)
     known = frozenset[str]() if prior is None else prior.known(axis)
     design = axis_design(data, model, axis, known=known)
     solution = _solve_axis(data, model, axis, design, noise, prior=prior)
+    weighting = noise or solution.noise
     for _ in range(GAUSS_NEWTON_STEPS if design.laws else 0):
         before, at = solution.values, _law_coefficients(design, solution)
         if data.channels.profile is not None:
@@ -178,9 +180,12 @@ def _converged(
             response = next_response(response, response_at(at), model, u_s)
             data, at = data.through(response), with_response(at, response)
         design = axis_design(data, model, axis, at, known)
-        solution = _solve_axis(data, model, axis, design, noise or solution.noise, prior=prior)
-        if np.allclose(solution.values, before, rtol=1e-7, atol=1e-14):
-            break
+        solution = _solve_axis(data, model, axis, design, weighting, prior=prior)
+        if len(solution.values) == len(before) and np.allclose(solution.values, before, rtol=1e-7, atol=1e-14):
+            found = noise or _solve_axis(data, model, axis, design, None, prior=prior).noise
+            if found.is_close(weighting):
+                break
+            weighting = found
     late = time_errors(data, axis)
     if not design.laws and late is None:
         return design, solution, late

@@ -84,6 +84,15 @@ class Noise:
     drift: Drift
     white_dps: float
 
+    def is_close(self, other: Noise) -> bool:
+        """Return whether fits that are weighted by these differ by less than a part in a million."""
+        pairs = (
+            (self.white_dps, other.white_dps),
+            (self.drift.drift_dps, other.drift.drift_dps),
+            (self.drift.per_rate, other.drift.per_rate),
+        )
+        return self.drift.taus_s == other.drift.taus_s and all(math.isclose(*pair, rel_tol=1e-6) for pair in pairs)
+
     def drift_beside(self, scatter: Scatter) -> Drift:
         """Return the drift as `solve` takes it: in units of the white noise where no readings state that."""
         if scatter.white_var is not None:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Iterator
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -15,7 +15,6 @@ from labctl.answers.certification import CertificationResponse, CertifyRequest
 from labctl.calibration import read_calibration
 from labctl.errors import LabctlError, NotEnoughData
 from labctl.fitting.effects import CATALOGUE
-from labctl.fitting.estimation import axis_solutions
 from labctl.probability_text import odds_text
 from labctl.recording import read_recording
 from labctl.services.calibrations.assessment import assess
@@ -23,8 +22,10 @@ from labctl.services.calibrations.certification import certify
 from labctl.services.calibrations.fitting import fit_unit, one_version
 from labctl.services.calibrations.revision import improve_unit
 from labctl.services.calibrations.served import calibration_file
-from labctl.services.criticism.criticise import criticise_unit
+from labctl.services.criticism.criticise import _undistinguished, criticise_unit
+from labctl.services.criticism.versions import version_of
 from labctl.services.recordings.examples import example
+from labctl.services.recordings.loading import chosen_rows
 from labctl.store import Store, open_store
 
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
@@ -131,10 +132,17 @@ def test_a_version_whose_effect_was_taken_out_again_is_asked_nothing(store: Stor
 
 
 @pytest.mark.slow
-def test_a_version_with_both_is_not_asked_which_it_is(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
-    """These data do not determine both, and the fit says so; an earlier labctl may have made such a version."""
+def test_effects_that_data_cannot_distinguish_are_refused_together(store: Store) -> None:
     with pytest.raises(NotEnoughData, match="scale_factor_odd and sine_response together are not determined"):
         improve_unit(store, GYRO, ImproveRequest(add=["scale_factor_odd", "sine_response"], version=1), AT)
-    monkeypatch.setattr(axis_solutions, "MAX_DEPARTURE", math.inf)
-    improve_unit(store, GYRO, ImproveRequest(add=["scale_factor_odd", "sine_response"], version=1), AT)
-    assert criticise_unit(store, GYRO, 3, None).undistinguished == []
+
+
+@pytest.mark.slow
+def test_a_version_with_both_is_not_asked_which_it_is(store: Store) -> None:
+    measured = chosen_rows(store, GYRO, None, ())
+    alone = version_of(store, GYRO, 2)
+    model = alone.answer["model"]
+    effects = [*model["effects"], "scale_factor_odd"]
+    both = replace(alone, answer={**alone.answer, "model": {**model, "effects": effects}})
+    assert [each["effect"] for each, _ in _undistinguished(store, alone, measured)] == ["sine_response"]
+    assert list(_undistinguished(store, both, measured)) == []
