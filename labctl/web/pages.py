@@ -30,7 +30,7 @@ ENTRY_SCRIPT = '  <script type="module"'
 #: Address prefixes of the pages; the router in the browser handles the rest of an address.
 PAGES = (
     "/start", "/bench", "/live", "/campaigns", "/units", "/explore", "/recordings", "/noise", "/effects",
-    "/certificates", "/fleet",
+    "/certificates", "/fleet", "/standards",
 )  # fmt: skip
 #: Scripts and styles of labctl only, and no embedding in a frame. Plotly writes inline styles, and compiles shaders for
 #: surfaces, which needs 'unsafe-eval'.

@@ -70,6 +70,7 @@ export type ResidualColumns = Schema<"ResidualColumns">;
 export type RestColumns = Schema<"RestColumns">;
 export type Scheduled = Schema<"ScheduledResponse">;
 export type SensorVersion = Schema<"SensorVersionResponse">;
+export type Standard = Schema<"StandardResponse">;
 export type StartEvent = Schema<"StartEventResponse">;
 export type TargetUnit = Schema<"TargetUnitResponse">;
 export type Trace = Schema<"TraceResponse">;

@@ -71,6 +71,11 @@ route(
   "Noise",
   withPlots(() => import("./pages/noise.js")),
 );
+route(
+  "/standards",
+  "Reference standards",
+  withPlots(() => import("./pages/standards.js")),
+);
 route("/certificates", "Certificate", () => import("./pages/certificate.js"));
 route("/effects", "Effects", () => import("./pages/effects.js"));
 route(

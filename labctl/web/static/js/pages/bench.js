@@ -33,7 +33,14 @@ export async function page({ query, signal }) {
     get("/api/schedule", { signal }),
   ]);
   const bench = benches[0];
-  if (!bench) return h("div", { class: "page" }, pageHeader("Bench"), noBenchCard(), othersCard(states, undefined));
+  if (!bench)
+    return h(
+      "div",
+      { class: "page" },
+      pageHeader("Bench", null, linkButton("Reference standards", "/standards", "tiny")),
+      noBenchCard(),
+      othersCard(states, undefined),
+    );
   const now = bench.campaign
     ? await get("/api/campaigns/{campaign}", { path: { campaign: bench.campaign }, signal })
     : campaigns.find((campaign) => campaign.bench === bench.name && isRunning(campaign));
@@ -59,6 +66,7 @@ export async function page({ query, signal }) {
           ? h("span", {}, "runs ", h("a", { href: `/campaigns/${now.id}` }, `campaign ${now.id}`), `, ${now.recipe}`)
           : null,
       ),
+      query.wall === "1" ? null : linkButton("Reference standards", "/standards", "tiny"),
       query.wall === "1" ? null : linkButton("Wall view", "/bench?wall=1", "tiny"),
     ),
   );
