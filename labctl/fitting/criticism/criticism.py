@@ -232,14 +232,9 @@ def criticise(
 
 @single_threaded
 def best_shapes(
-    recording: Recording,
-    model: ErrorModel,
-    catalogue: Mapping[str, Effect],
-    *,
-    points: Recording,
-    is_decimated: bool = False,
-    static: StaticRecord | None = None,
-) -> dict[str, Term]:
+    recording: Recording, model: ErrorModel, catalogue: Mapping[str, Effect], *, points: Recording,
+    is_decimated: bool = False, static: StaticRecord | None = None,
+) -> dict[str, Term]:  # fmt: skip
     """Return effect id -> the shape that fits a recording best beside a model, whatever the evidence for the effect.
 
     `points` are the recording's means, `is_decimated` and `static` as of `criticise`. Raises NotEnoughData where the
