@@ -137,6 +137,12 @@ def as_measured_rate(name: str) -> str:
     return renamed if n else ""
 
 
+def is_bare_rate(name: str) -> bool:
+    """Whether a name says a rate and not whose: alone it is the gyro's, beside an output of the gyro the table's."""
+    stems = (folded(stem) for stem, _ in _divided(name.strip()))
+    return any(stem in {"rate", "angular rate", "angular velocity", "omega"} for stem in stems)
+
+
 def is_second_choice(name: str) -> bool:
     """Whether a column gives way to another of the same meaning: a rate that was asked for, or one of a vehicle."""
     return is_commanded(name) or re.match(rf"(?:{'|'.join(_VEHICLE)})[_ ]?rate\b", folded(name)) is not None

@@ -29,6 +29,7 @@ from labctl.recording.column_map.names import (
     as_measured_rate,
     folded,
     in_unit,
+    is_bare_rate,
     is_second_choice,
     name_says,
 )
@@ -140,9 +141,13 @@ def _name_says(table: RawTable, name: str) -> NameSays:
     """Return what a name says: a `T` beside a column of time is a temperature."""
     unit = table.columns[name].unit
     says = in_unit(name, unit) if unit else name_says(name)
-    others = {name_says(other).target for other in table.columns if other != name}
+    named = {other: name_says(other).target for other in table.columns if other != name}
+    others = set(named.values())
     if says.target == "t_s" and name.strip() == "T" and "t_s" in others:
         return NameSays("temperature_c", unit)
+    surely_gyro = any(_is_gyro(target) and not is_bare_rate(other) for other, target in named.items())
+    if _is_gyro(says.target) and is_bare_rate(name) and surely_gyro and "table_rate_dps" not in others:
+        return NameSays("table_rate_dps", says.unit)
     if not says.target and "table_rate_dps" in others and any(map(_is_gyro, others)) and as_measured_rate(name):
         return in_unit(as_measured_rate(name), unit)
     return says

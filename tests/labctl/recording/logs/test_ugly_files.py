@@ -328,6 +328,26 @@ def test_a_measured_rate_goes_before_the_commanded_one(order: tuple[str, str], t
     assert taken == pytest.approx(1.001 * rates, abs=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("rate", "output"),
+    [("rate_dps", "gyro_out_dps"), ("angular rate [deg/s]", "gyro_z [deg/s]"), ("rate [deg/s]", "gyro output [deg/s]")],
+)
+def test_a_bare_rate_beside_an_output_of_the_gyro_is_the_tables(rate: str, output: str, tmp_path: Path) -> None:
+    rates = np.repeat([0.0, 20.0, -20.0, 40.0], 250)
+    columns = np.column_stack([ROWS[:, 0], rates, ROWS[:, 3] + rates, ROWS[:, 4]])
+    path = text(lines([["t [s]", rate, output, "temp [degC]"]], columns.round(6).tolist()))(tmp_path)
+    recording = log_with_map(path, None, {}, None).recording
+    assert np.asarray(recording.columns["table_rate_dps"], dtype=np.float64) == pytest.approx(rates)
+    np.testing.assert_allclose(recording.gyro_dps("z"), ROWS[:, 3] + rates, rtol=0, atol=1e-6)
+
+
+def test_a_bare_rate_alone_is_that_of_the_gyro(tmp_path: Path) -> None:
+    columns = np.column_stack([ROWS[:, 0], ROWS[:, 3], ROWS[:, 4]])
+    path = text(lines([["t [s]", "rate [deg/s]", "temp [degC]"]], columns.round(6).tolist()))(tmp_path)
+    recording = log_with_map(path, None, {}, None).recording
+    np.testing.assert_allclose(recording.gyro_dps("z"), ROWS[:, 3], rtol=0, atol=1e-6)
+
+
 def test_only_the_calling_thread_reads_a_text(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     readers = set()
     read = TextStream.read
