@@ -67,7 +67,7 @@ def test_names_are_those_of_the_axes_and_of_the_nodes_of_a_table() -> None:
 def test_data_and_prior_together_are_the_weighted_mean_of_both(names: tuple[str, ...]) -> None:
     data = planned_data(FULL, BODY_AXES, NOISE)
     model, _ = PRESET.build(data)
-    stated = {axis: replace(s, scale=1.0) for axis, s in solve_axes(data, model).solutions.items()}
+    stated = solve_axes(data, model).noise
     fit = solve_axes(data, model, stated).fits["x"]
     k = fit.values.size
     rng = np.random.default_rng(1)

@@ -187,7 +187,7 @@ def test_a_bad_file_gives_one_error_and_stores_nothing(kind: str, tmp_path: Path
     assert refused.value.exit_status == 2
     line = str(refused.value)
     assert "\n" not in line
-    assert len(line) < 1000
+    assert len(line.replace(str(tmp_path), "")) < 1000
     assert path.name in line or path == tmp_path
 
 
