@@ -345,7 +345,7 @@ def test_a_bare_rate_alone_is_that_of_the_gyro(tmp_path: Path) -> None:
     columns = np.column_stack([ROWS[:, 0], ROWS[:, 3], ROWS[:, 4]])
     path = text(lines([["t [s]", "rate [deg/s]", "temp [degC]"]], columns.round(6).tolist()))(tmp_path)
     recording = log_with_map(path, None, {}, None).recording
-    np.testing.assert_allclose(recording.gyro_dps("z"), ROWS[:, 3], rtol=0, atol=1e-6)
+    assert recording.gyro_dps("z") == pytest.approx(ROWS[:, 3], abs=1e-6)
 
 
 def test_only_the_calling_thread_reads_a_text(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
