@@ -21,7 +21,7 @@ CERTIFICATE = {"number": "T-1", "laboratory": "DKD 17", "calibrated": "2024-01-1
 def register(service: Service) -> Service:
     service.post("/api/standards", STANDARD)
     service.post("/api/standards/Pt100-7/certificates", CERTIFICATE)
-    for value in (0.011, 0.013, 0.9):
+    for value in (0.011, 0.013, 0.012, 0.0125, 0.0118, 0.0122, 0.0131, 0.0124, 0.0119, 0.9):
         check = {"value": value, "u": 0.01, "nominal": -20.0, "by": "T. Tester", "note": f"ice, {value}"}
         service.post("/api/standards/Pt100-7/checks", check)
     service.post("/api/standards", {**STANDARD, "label": "clock-1", "quantity": "clock", "serial": ""})
@@ -56,8 +56,12 @@ def test_each_standard_has_its_state_and_what_it_rests_on(register: Service, vis
     assert [each == "x" for each in drawn["check"]["marker"]["symbol"]] == [
         each["state"] == "out" for each in known["checks"]
     ]
-    for name in ("low", "high"):
-        assert drawn[f"{name} limit"]["y"] == [each["limits"][0][name] for each in known["checks"]]
+    for basis in ("history", "stated u"):
+        limits = [next((one for one in each["limits"] if one["basis"] == basis), None) for each in known["checks"]]
+        for name in ("low", "high"):
+            expected = [None if one is None else one[name] for one in limits]
+            assert any(expected)
+            assert drawn[f"{name} by {basis}"]["y"] == expected
 
 
 @pytest.mark.slow

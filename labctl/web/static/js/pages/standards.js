@@ -16,6 +16,13 @@ import { figure } from "../core/figure.js";
 const KINDS = { valid: "good", "no certificate": "warn", overdue: "bad", "check it": "warn", bad: "bad" };
 /** @type {Record<Check["state"], string>} */
 const CHECKS = { in: "good", warning: "warn", out: "bad", unknown: "" };
+/** What the limits of a control chart rest on. @type {Record<string, { dash: string, text: string }>} */
+const BASES = {
+  history: { dash: "dash", text: "dashed by the earlier checks" },
+  "stated u": { dash: "dot", text: "dotted by the uncertainties that are stated" },
+};
+/** @param {string} basis */
+const isBy = (basis) => (/** @type {Check["limits"][number]} */ limits) => limits.basis === basis;
 /** Limits of a control chart lie so many standard deviations from its centre. */
 const LIMIT = 3;
 
@@ -175,19 +182,24 @@ const checks = (standard) =>
 function controlChart(standard, nominal) {
   const shown = standard.checks.filter((each) => each.nominal === nominal);
   const at = shown.map((each) => each.checked_at);
-  /** @param {"low" | "high" | "centre"} name */
-  const line = (name) => ({
+  /** The limits of each check by one basis; a check need not have all. */
+  const bases = Object.keys(BASES).filter((basis) => shown.some(({ limits }) => limits.some(isBy(basis))));
+  /**
+   * @param {string} basis
+   * @param {"low" | "high" | "centre"} name
+   */
+  const line = (basis, name) => ({
     type: "scatter",
     mode: "lines",
     x: at,
-    y: shown.map((each) => each.limits[0]?.[name] ?? null),
-    line: { width: 1, dash: name === "centre" ? "solid" : "dash", color: "#888888" },
-    name: name === "centre" ? "centre" : `${name} limit`,
+    y: shown.map(({ limits }) => limits.find(isBy(basis))?.[name] ?? null),
+    line: { width: 1, dash: name === "centre" ? "solid" : BASES[basis].dash, color: "#888888" },
+    name: `${name} by ${basis}`,
     hoverinfo: "skip",
   });
   const draw = () => ({
     data: [
-      ...["low", "centre", "high"].map((name) => line(/** @type {"low" | "high" | "centre"} */ (name))),
+      ...bases.flatMap((basis) => [line(basis, "low"), line(basis, "centre"), line(basis, "high")]),
       {
         type: "scatter",
         mode: "markers",
@@ -207,15 +219,27 @@ function controlChart(standard, nominal) {
     },
   });
   const csv = () => [
-    ["checked_at", `value_${standard.unit}`, `u_${standard.unit}`, "centre", "low", "high", "state"],
-    ...shown.map((each) => {
-      const limits = each.limits[0];
-      return [each.checked_at, each.value, each.u, limits?.centre, limits?.low, limits?.high, each.state];
-    }),
+    [
+      "checked_at",
+      `value_${standard.unit}`,
+      `u_${standard.unit}`,
+      "state",
+      ...bases.flatMap((basis) => [`low by ${basis}`, `high by ${basis}`]),
+    ],
+    ...shown.map(({ checked_at, value, u, state, limits }) => [
+      checked_at,
+      value,
+      u,
+      state,
+      ...bases.flatMap((basis) => {
+        const by = limits.find(isBy(basis));
+        return [by?.low, by?.high];
+      }),
+    ]),
   ];
   return figure(
     `Control chart of ${standard.label}${nominal === null ? "" : ` at ${sized(nominal, standard)}`}`,
-    `All ${shown.length} checks (error: indicated minus true) with their standard uncertainties; dashed: the limits of each, ${LIMIT} standard deviations from the centre. A check beyond a limit is a cross.`,
+    `All ${shown.length} checks (error: indicated minus true) with their standard uncertainties, and the limits of each, ${LIMIT} standard deviations from the centre: ${bases.map((basis) => BASES[basis].text).join(", ")}. A check beyond any of its limits is a cross.`,
     draw,
     { height: "14rem", csv },
   );
