@@ -215,6 +215,8 @@ class Undistinguished(TypedDict):
     """Id of an effect that the version has, and one of the five versions before it has not."""
     others: list[str]
     """Ids of the effects that would explain the data as well in its place."""
+    version: int
+    """Number of the version before it of which the data showed that, and whose next experiments tell them apart."""
 
 
 class Remainder(TypedDict):

@@ -146,7 +146,7 @@ def test_the_error_runs_from_the_one_version_to_the_other_and_ends_green(
     shades = cells["marker"]["color"] if "marker" in cells else [z for row in cells["z"] for z in row if z is not None]
     assert max(shades) <= max(scores) + 1e-3
     assert min(shades) >= min(scores) - 1e-3
-    assert after["undistinguished"] == [{"effect": "sine_response", "others": ["scale_factor_odd"]}]
+    assert after["undistinguished"] == [{"effect": "sine_response", "others": ["scale_factor_odd"], "version": 1}]
     expect(finish).to_contain_text("the cause is not known: sine response or scale factor odd")
     finish.get_by_role("button", name="Certify").click()
     expect(page.get_by_role("dialog")).to_contain_text("Certify version 2 of")

@@ -68,7 +68,7 @@ def units(
 
 def _print_units(units: list[UnitResponse], total: int) -> None:
     """Print what the page of units shows."""
-    heads = ("unit", "type", "batch", "recordings", "versions", "error / floor", "in force", "verdict then", "due")
+    heads = ("unit", "type", "batch", "recordings", "versions", "error / floor", "in force", "certified as", "due")
     rows = table("", *heads)
     for each in units:
         in_force = each.certified_version is not None

@@ -69,11 +69,11 @@ def _with_causes_not_known(
     answer: CriticismResponse, store: Store, row: CalibrationRecord, measured: tuple[RecordingRow, ...]
 ) -> CriticismResponse:
     """Return an answer that says, behind the verdict, of which parts of its model the cause is not known."""
-    found = list(_undistinguished(store, row, measured))
+    undistinguished = list(_undistinguished(store, row, measured))
     sentences = [
         f"These data do not show that the cause is {each['effect']}, which version {row.version} contains: "
-        f"{' or '.join(each['others'])} would explain them as well (criticism of version {before})."
-        for each, before in found
+        f"{' or '.join(each['others'])} would explain them as well (criticism of version {each['version']})."
+        for each in undistinguished
     ] + [
         f"The formula {term['effect']} of version {row.version} describes the error; it names no cause."
         for term in row.answer["model"].get("terms", ())
@@ -82,7 +82,7 @@ def _with_causes_not_known(
     place = len(answer.warnings) + 1
     return answer.model_copy(
         update={
-            "undistinguished": [each for each, _ in found], "cause_not_known": sentences,
+            "undistinguished": undistinguished, "cause_not_known": sentences,
             "text": [*answer.text[:place], *sentences, *answer.text[place:]],
         }
     )  # fmt: skip
@@ -90,8 +90,8 @@ def _with_causes_not_known(
 
 def _undistinguished(
     store: Store, row: CalibrationRecord, measured: tuple[RecordingRow, ...]
-) -> Iterator[tuple[Undistinguished, int]]:
-    """Yield which effects of a version these data could not tell from others, with the version that lacks them.
+) -> Iterator[Undistinguished]:
+    """Yield which effects of a version these data could not tell from others.
 
     Beside an effect that was added, what explains the same looks like noise: only the version before shows it.
     """
@@ -105,7 +105,7 @@ def _undistinguished(
         for effect in added if earlier.verdict == "ambiguous" else ():
             others = [each for each in groups.get(effect, ()) if each in earlier.named and each not in effects]
             if effect in earlier.named and others:
-                yield {"effect": effect, "others": others}, before.version
+                yield {"effect": effect, "others": others, "version": before.version}
 
 
 def _additions(store: Store, row: CalibrationRecord) -> Iterator[tuple[CalibrationRecord, list[str]]]:

@@ -16568,6 +16568,11 @@ export interface components {
              * @description Ids of the effects that would explain the data as well in its place.
              */
             others: string[];
+            /**
+             * Version
+             * @description Number of the version before it of which the data showed that, and whose next experiments tell them apart.
+             */
+            version: number;
         };
         /**
          * UnitResponse

@@ -86,7 +86,7 @@ def test_the_table_of_units_says_what_the_answer_says(fog: Lab) -> None:
     (unit,) = fog.json("units")
     (error,) = unit["newest_errors"]["over_floor"]
     heads, row = (line for line in fog.run("units").stdout.splitlines() if line.strip())
-    assert " ".join(heads.split()) == "unit type batch recordings versions error / floor in force verdict then due"
+    assert " ".join(heads.split()) == "unit type batch recordings versions error / floor in force certified as due"
     words = [
         serial,
         unit["model"],

@@ -48,7 +48,7 @@ def test_an_adequate_version_names_what_would_explain_its_data_as_well(store: St
     assert (before.verdict, before.undistinguished) == ("ambiguous", [])
     assert after.verdict == "adequate"
     assert after.undistinguished == [
-        {"effect": "sine_response", "others": [name for name in before.named if name != "sine_response"]}
+        {"effect": "sine_response", "others": [name for name in before.named if name != "sine_response"], "version": 1}
     ]
     assert after.cause_not_known == [after.text[1]]
     assert after.text[1].startswith("These data do not show that the cause is sine_response")
@@ -120,6 +120,7 @@ def test_a_formula_is_said_to_name_no_cause_behind_the_verdict_and_the_warnings(
         of_the_version_before.replace("version 2", "version 3"),
         "The formula bend of version 3 describes the error; it names no cause.",
     ]
+    assert [each["version"] for each in answer.undistinguished] == [1]
     place = len(answer.warnings) + 1
     assert answer.text[place : place + 2] == answer.cause_not_known
 
@@ -144,5 +145,5 @@ def test_a_version_with_both_is_not_asked_which_it_is(store: Store) -> None:
     model = alone.answer["model"]
     effects = [*model["effects"], "scale_factor_odd"]
     both = replace(alone, answer={**alone.answer, "model": {**model, "effects": effects}})
-    assert [each["effect"] for each, _ in _undistinguished(store, alone, measured)] == ["sine_response"]
+    assert [each["effect"] for each in _undistinguished(store, alone, measured)] == ["sine_response"]
     assert list(_undistinguished(store, both, measured)) == []

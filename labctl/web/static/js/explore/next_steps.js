@@ -129,15 +129,16 @@ const unknownCauses = ({ undistinguished }) =>
  * @param {Given} given
  * @param {Criticism} criticism
  */
-function causeExperiments({ unit: { serial }, calibration: { version, parent }, chosen }, { undistinguished }) {
-  if (!undistinguished.length || parent === null) return null;
-  const query = changedQuery("", { unit: serial, version: parent, ...inAddress(chosen) });
+function causeExperiments({ unit: { serial }, calibration: { version }, chosen }, { undistinguished }) {
+  if (!undistinguished.length) return null;
+  const before = undistinguished[0].version;
+  const query = changedQuery("", { unit: serial, version: before, ...inAddress(chosen) });
   return h(
     "a",
     {
       class: "button",
       href: `/explore?${query}#learn`,
-      title: `They are those of version ${parent}, before version ${version}.`,
+      title: `They are those of version ${before}, before version ${version}.`,
     },
     "Experiments to distinguish the causes",
   );
