@@ -216,7 +216,7 @@ class Undistinguished(TypedDict):
     others: list[str]
     """Ids of the effects that would explain the data as well in its place."""
     version: int
-    """Number of the version before it of which the data showed that, and whose next experiments tell them apart."""
+    """Number of the version before it of which the data showed that, and whose next experiments distinguish them."""
 
 
 class Remainder(TypedDict):

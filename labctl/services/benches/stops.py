@@ -38,7 +38,7 @@ class BenchStops:
         self._latch = self.place.latch
         self._guard = threading.Lock()
         self._recorded: set[str] = set()
-        self._writing: list[threading.Thread] = []
+        self._writing: set[threading.Thread] = set()
         self._seen: tuple[tuple[int, int], LatchState] = ((0, 0), LatchState())
 
     def prepare(self) -> None:
@@ -52,8 +52,9 @@ class BenchStops:
     @property
     def state(self) -> LatchState:
         """What the latch says now, with what is being written into it."""
-        while self._writing:
-            self._writing.pop().join(WRITTEN_WITHIN_S)
+        for thread in tuple(self._writing):  # left in the set until it has ended, so that every reader waits for it
+            thread.join(WRITTEN_WITHIN_S)
+            self._writing.discard(thread)
         stamp = self._latch.stamp
         if stamp == (0, 0) or stamp != self._seen[0]:
             self._seen = (stamp, self._latch.state())
@@ -69,8 +70,8 @@ class BenchStops:
                 log.error("latch.unwritable", bench=self._bench, error=str(error))
 
         thread = threading.Thread(target=write, name="latch", daemon=True)
-        self._writing.append(thread)
-        thread.start()
+        thread.start()  # before a reader can see it: only a thread that was started can be waited for
+        self._writing.add(thread)
 
     def record(self, stop: StopRequest, at: datetime) -> None:
         """Write a stop into the audit trail, unless it is there. Raises StoreError."""

@@ -16570,7 +16570,7 @@ export interface components {
             others: string[];
             /**
              * Version
-             * @description Number of the version before it of which the data showed that, and whose next experiments tell them apart.
+             * @description Number of the version before it of which the data showed that, and whose next experiments distinguish them.
              */
             version: number;
         };
