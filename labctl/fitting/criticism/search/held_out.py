@@ -88,7 +88,12 @@ class _Axis:
         return _Axis(axis, scale, y, added, 1.0 / np.maximum(np.abs(fitted), least) ** 2)
 
     def errors(self, comparison: Comparison, mask: NDArray[np.bool_]) -> tuple[float, float]:
-        """Return the chi2 of the data sets of a mask, predicted from the others without the terms and with them."""
+        """Return the chi2 of the data sets of a mask, predicted from the others without the terms and with them.
+
+        Both are weighted by the inverse covariance of what the model without the terms predicts: noise, and the
+        covariance of its coefficients (here by the matrix inversion lemma). So what the other data sets do not
+        determine, such as a parabola over three temperatures of which one is left out, counts for neither.
+        """
         data, model = comparison.data, comparison.model
         table = model.temperature
         if isinstance(table, LagrangeTable):
@@ -109,7 +114,9 @@ class _Axis:
             (np.concatenate([base, self.added], axis=2), np.concatenate([precision, self.precision])),
         ):
             values = _solved(rows[in_fit], self.y[in_fit], prior)
-            axis_errors.append(float(np.sum((self.y[left_out] - rows[left_out] @ values) ** 2)))
+            residual = np.where(left_out, self.y - rows @ values, 0.0)
+            followed = base @ _solved(base[data.present], residual[data.present], precision)
+            axis_errors.append(float(np.sum(residual * (residual - followed))))
         return axis_errors[0], axis_errors[1]
 
 

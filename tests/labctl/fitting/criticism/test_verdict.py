@@ -179,6 +179,18 @@ def test_a_term_that_predicts_left_out_temperatures_worse_rises() -> None:
     assert not held_out_rises(comparison, (Term("scale_factor_asymmetry"),), CATALOGUE)
 
 
+def test_a_curve_over_three_temperatures_does_not_hide_a_law_of_the_rate() -> None:
+    """Two temperatures do not determine the parabola with which the third is predicted, with the law or without it."""
+    recording = single_axis(3)
+    warm = np.asarray(recording.columns["chamber_setpoint_c"])
+    is_kept = np.isin(warm, np.unique(warm)[[0, 5, -1]])
+    columns = {name: np.asarray(values)[is_kept] for name, values in recording.columns.items()}
+    columns["gyro_z"] = columns["gyro_z"] + 3e-8 * columns["table_rate_dps"] ** 3
+    found = held(replace(recording, columns=columns), "bias_scale")
+    assert found.verdict.form == "ambiguous"
+    assert set(found.verdict.groups[0]) == {"scale_factor_odd", "sine_response"}
+
+
 def test_the_experiment_in_words_is_the_first_of_the_list() -> None:
     found = held(made("ojeda2000", 1))
     reported = Criticism(
