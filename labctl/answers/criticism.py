@@ -131,8 +131,11 @@ class Advice(TypedDict):
     """Id of the effect."""
     add: bool
     """Whether the exported calibration becomes better with the effect."""
+    checked: bool
+    """Whether that is known; false: no part of the data can be left out, so that it is not known either whether it
+    becomes worse."""
     why: str
-    """Why not to add it; empty where `add` is true."""
+    """Why not to add it, or why that is not known; empty where `add` is true."""
     before_dps: float | None
     """RMS error on the parts left out without the effect, deg/s; null: no part can be left out."""
     after_dps: float | None

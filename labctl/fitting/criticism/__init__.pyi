@@ -1,4 +1,3 @@
-from labctl.fitting.criticism.advice import NOT_CHECKED as NOT_CHECKED
 from labctl.fitting.criticism.estimated_shapes import (
     CandidateEstimates as CandidateEstimates,
     EstimatedShape as EstimatedShape,

@@ -38,8 +38,6 @@ BEYOND_K = 1.0
 MIN_GAIN, MIN_GAIN_AT_REST = 0.01, 0.15
 #: From so many parts on the gain also has to exceed what their scatter explains, at this probability (Student's t).
 PARTS_THAT_SCATTER, CERTAIN = 3, 0.95
-#: How the reason begins where neither can be known: whether the export becomes better, and whether it does not.
-NOT_CHECKED = "no part of these data can be left out to check it"
 
 
 @dataclass(frozen=True)
@@ -51,6 +49,11 @@ class Exported:
     least_gain: float = MIN_GAIN
     is_chance: bool = False  #: whether the gain differs so from part to part that it may be none
     needs: str = ""  #: where there is no error: what the data lack for one
+
+    @property
+    def is_known(self) -> bool:
+        """Whether there is an error without the effect and one with it."""
+        return self.before_dps is not None and self.after_dps is not None
 
     @property
     def is_better(self) -> bool:
@@ -72,11 +75,13 @@ def advice_for(
     for term in terms:
         report_stage(f"checking what a calibration with {term.effect} would do")
         checked = exported_errors(data, model, tuple(beside), term)
-        reason = _why_not_carried(term) or _why_not_better(checked)
+        not_carried = _why_not_carried(term)
+        reason = not_carried or _why_not_better(checked)
         advice.append(
             Advice(
                 effect=term.effect,
                 add=not reason,
+                checked=bool(not_carried) or checked.is_known,
                 why=reason,
                 before_dps=checked.before_dps,
                 after_dps=checked.after_dps,
@@ -104,7 +109,7 @@ def _why_not_better(exported: Exported) -> str:
     if exported.is_better:
         return ""
     if exported.before_dps is None or exported.after_dps is None:
-        return f"{NOT_CHECKED}{exported.needs}"
+        return f"no part of these data can be left out to check it{exported.needs}"
     scatter = ", and from part to part the difference scatters by more" if exported.is_chance else ""
     return (
         f"what would be exported does not become clearly better on parts left out of the fit: {exported.after_dps:.3g} "

@@ -56,7 +56,7 @@ from labctl.recording.verification import fitted_part
 STEPS_LEAVE = 1.5
 QUANTIZATION = "quantization"
 NO_CORRECTION = Advice(
-    effect=QUANTIZATION, add=False, why="no calibration corrects what the steps of an output leave out",
+    effect=QUANTIZATION, add=False, checked=True, why="no calibration corrects what the steps of an output leave out",
     before_dps=None, after_dps=None,
 )  # fmt: skip
 

@@ -75,7 +75,7 @@ class ThermalFamily:
     def advice(self) -> Advice:
         """To add it: it was chosen by what it leaves of stretches left out."""
         return Advice(
-            effect=LAG, add=True, why="", before_dps=self.before.rms_dps, after_dps=self.after.rms_dps
+            effect=LAG, add=True, checked=True, why="", before_dps=self.before.rms_dps, after_dps=self.after.rms_dps
         )  # fmt: skip
 
     @property
@@ -84,7 +84,7 @@ class ThermalFamily:
         if self.beside is None or self.alone is None:
             return ()
         name, before, after = self.beside.effect, self.alone.rms_dps, self.after.rms_dps
-        return (Advice(effect=name, add=True, why="", before_dps=before, after_dps=after),)
+        return (Advice(effect=name, add=True, checked=True, why="", before_dps=before, after_dps=after),)
 
     @property
     def terms(self) -> tuple[Term, ...]:

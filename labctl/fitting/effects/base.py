@@ -150,6 +150,7 @@ class Effect(ABC):
     shows_at_rest: bool = False  #: whether it is an error of the bias, at least in part: then it takes no rate to see
     remembers: ClassVar[bool] = False  #: whether it needs the temperatures before, which a state stands for in use
     exact: ClassVar[bool] = False  #: whether its parameters determine its shape: a fit alone distinguishes two such
+    bends_at_high_rates: ClassVar[bool] = False  #: whether it is a law of the rate alone that grows towards the limit
     is_random: ClassVar[bool] = False  #: each powered run or mounting has a coefficient of its own, a draw
     in_use: ClassVar[bool] = True  #: whether what it needs is known where the gyro is used, and not on the bench only
 

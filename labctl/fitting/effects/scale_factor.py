@@ -158,6 +158,7 @@ class ScaleFactorOdd(_Power):
     """Scale factor nonlinearity of odd order."""
 
     id = "scale_factor_odd"
+    bends_at_high_rates = True
     term = "Scale factor nonlinearity, odd order"
     sentence = "The error bends away from a line at high rates, with opposite signs for the two directions."
     first = 3
@@ -186,6 +187,7 @@ class SineResponse(Effect):
     """
 
     id = "sine_response"
+    bends_at_high_rates = True
     term = "Sine response (open-loop interferometer)"
     sentence = "The output is proportional to the sine of the optical phase, so it is too small at high rates."
     origin: ClassVar[Origin] = "sensor"
@@ -245,6 +247,7 @@ class Saturation(Effect):
     """Saturation near the input rate limit."""
 
     id = "saturation"
+    bends_at_high_rates = True
     term = "Saturation (input rate limit)"
     sentence = "Above a certain rate the output increases less than the rate, in the extreme no longer."
     origin: ClassVar[Origin] = "sensor"

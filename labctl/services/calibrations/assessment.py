@@ -98,13 +98,16 @@ def _of_verdict(criticism: CriticismResponse | None, error: CertifiedErrors) -> 
         if figure is not None
     )
     version = f"{criticism.serial} --version {criticism.version}"
-    do = f"find out which effect is missing: labctl criticise {version}"
+    do = f"find out which effect is missing, on the page of the version or by labctl criticise {version}"
     if criticism.verdict == "missing":
-        do = f"add the missing effect and certify the new version: labctl improve {version} --add {criticism.named[0]}"
+        do = (
+            f"add {criticism.named[0]} and certify the new version, on the page of the version or by "
+            f"labctl improve {version} --add {criticism.named[0]}"
+        )
     elif criticism.verdict == "ambiguous":
         do = (
-            f"make the measurement that distinguishes these effects (labctl criticise {version}), add the right one "
-            "and certify the new version"
+            "make the measurement that distinguishes these effects (on the page of the version, or by labctl criticise "
+            f"{version}), add the right one and certify the new version"
         )
     text = (
         f"the verdict on recording {criticism.recording} is {criticism.verdict!r} ({figures}): {_sentence(criticism)}"

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from labctl.answers.criticism import Advice, Experiment
-from labctl.fitting.criticism import MIN_CAUSE, NOT_CHECKED, Criticism, Suspect
+from labctl.fitting.criticism import MIN_CAUSE, Criticism, Suspect
 from labctl.fitting.effects import CATALOGUE
 from labctl.probability_text import odds_text, probability_text
 from labctl.services.criticism.next_experiment import MIN_NAMING, naming_probability
@@ -17,8 +17,6 @@ from labctl.shown_unit import shown_unit
 COMMON = 0.8
 #: From this probability on that an experiment names the cause alone, it is said to distinguish the effects.
 LIKELY = 0.5
-#: Effects that are a function of the rate alone, alike up to some rate.
-RATE_LAWS = frozenset({"scale_factor_odd", "sine_response", "saturation"})
 #: What to do about a temperature that was not logged.
 LOG_IT = (
     "Log a second thermometer, near the sensing element or the electronics, or shield the unit from draught, sun and "
@@ -166,7 +164,12 @@ def beyond_the_rates(criticism: Criticism, experiments: Sequence[Experiment]) ->
     Experiments are changes of a recipe like the recording, and go to no higher rate.
     """
     is_likely = any(naming_probability(each) >= LIKELY for each in experiments[:1])
-    if not experiments or is_likely or not RATE_LAWS.issuperset(criticism.verdict.indistinguishable):
+    alike = criticism.verdict.indistinguishable
+    if (
+        not experiments
+        or is_likely
+        or not all(name in CATALOGUE and CATALOGUE[name].bends_at_high_rates for name in alike)
+    ):
         return []
     largest_dps = float(np.max(np.abs(criticism.data.at_sets(criticism.data.nodes.table_rate_dps()))))
     text = (
@@ -182,21 +185,14 @@ def advice_sentences(criticism: Criticism) -> list[str]:
     What is advised of several effects that cannot be distinguished is the one with the most evidence, also where
     another one would leave a little less error.
     """
-    return [
-        _advised(each, criticism) if each["add"] else _not_advised(each["effect"], each["why"])
-        for each in criticism.advice
-    ]
-
-
-def _not_advised(effect: str, why: str) -> str:
-    return (
-        f"Whether to add {effect} is not known: {why}."
-        if why.startswith(NOT_CHECKED)
-        else f"Do not add {effect}: {why}."
-    )
+    return [_advised(each, criticism) for each in criticism.advice]
 
 
 def _advised(advice: Advice, criticism: Criticism) -> str:
+    if not advice["checked"]:
+        return f"Whether to add {advice['effect']} is not known: {advice['why']}."
+    if not advice["add"]:
+        return f"Do not add {advice['effect']}: {advice['why']}."
     return (
         f"Adding {advice['effect']} is advised{_first_of_group(advice['effect'], criticism)}: on the parts left out of "
         f"the fit, the exported calibration then leaves an error of {advice['after_dps']:.3g} deg/s, now "

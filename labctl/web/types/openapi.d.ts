@@ -2949,8 +2949,13 @@ export interface components {
              */
             add: boolean;
             /**
+             * Checked
+             * @description Whether that is known; false: no part of the data can be left out, so that it is not known either whether it becomes worse.
+             */
+            checked: boolean;
+            /**
              * Why
-             * @description Why not to add it; empty where `add` is true.
+             * @description Why not to add it, or why that is not known; empty where `add` is true.
              */
             why: string;
             /**

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, cast
 
 import pytest
 
-from labctl.fitting.criticism.advice import NOT_CHECKED
 from labctl.fitting.criticism.suspects import Suspect, with_groups
 from labctl.services.criticism.advice_text import advice_sentences, why_not_named
 
@@ -15,7 +14,7 @@ if TYPE_CHECKING:
     from labctl.fitting.criticism import Criticism
 
 GROUP = ("sine_response", "scale_factor_odd")
-ADVISED = {"effect": "sine_response", "add": True, "why": "", "before_dps": 0.5, "after_dps": 0.05}
+ADVISED = {"effect": "sine_response", "add": True, "checked": True, "why": "", "before_dps": 0.5, "after_dps": 0.05}
 
 
 def suspect(effect: str, log_bf: float, after_dps: float | None = None) -> Any:
@@ -47,8 +46,8 @@ def test_of_effects_that_cannot_be_distinguished_the_odds_say_why_one_comes_firs
 
 def test_what_cannot_be_checked_is_not_advised_against() -> None:
     unchecked = criticism([])
-    unchecked.advice[:] = [{**ADVISED, "add": False, "why": f"{NOT_CHECKED}: too few"}]  # type: ignore[index]
-    assert advice_sentences(unchecked) == [f"Whether to add sine_response is not known: {NOT_CHECKED}: too few."]
+    unchecked.advice[:] = [{**ADVISED, "add": False, "checked": False, "why": "too few"}]  # type: ignore[index]
+    assert advice_sentences(unchecked) == ["Whether to add sine_response is not known: too few."]
     unchecked.advice[:] = [{**ADVISED, "add": False, "why": "it is worse"}]  # type: ignore[index]
     assert advice_sentences(unchecked) == ["Do not add sine_response: it is worse."]
 

@@ -9,6 +9,7 @@ import { option, selectField } from "../core/fields.js";
 import { query, updateQuery } from "../core/router.js";
 import { recordingMarks } from "../core/recording_marks.js";
 import { residualText } from "./chosen_recordings.js";
+import { oneFloorText } from "./noise_floor.js";
 import { residualCell } from "./notebook_cell.js";
 import { pointCard } from "./point_card.js";
 import { cellsText, hasMap, mapsOf, SCALE_TEXT } from "./residual_cells.js";
@@ -23,15 +24,6 @@ import { channelName, channelTitle, scaled, setText, shownText } from "./dataset
 const DEFAULT_CHANNELS = ["table_rate_dps", "temperature_c", "t_s", "order"];
 const MAX_LISTED = 12;
 
-/**
- * What one noise floor for all data sets hides, where no readings say what each has; with a space before it.
- * @param {ExploreState["criticism"]} criticism
- */
-const oneFloorText = ({ error: { noise_floor_source: source } }) =>
-  source === "repeats" || source === "scatter about a smooth surface"
-    ? " Here the noise floor is one number for all data sets, since the recording has no readings within them: where the noise grows with the rate, an error at low rates is larger against the noise than its cell shows, and at high rates smaller."
-    : "";
-
 /** @param {ExploreState} state */
 export function residualDiagnostics(state) {
   const rows = () => selectedRows(state);
@@ -39,7 +31,7 @@ export function residualDiagnostics(state) {
     ? null
     : residualMap(
         "Residual over floor",
-        `Each measured cell shows the mean residual of its data sets divided by the noise floor. ${cellsText(state.criticism)}${oneFloorText(state.criticism)} Faded cells are less than two noise floors from zero; a single faded cell is not significant. ${SCALE_TEXT} Drag over cells to select them, or click one cell.`,
+        `Each measured cell shows the mean residual of its data sets divided by the noise floor. ${cellsText(state.criticism)}${oneFloorText(state.criticism.error)} Faded cells are less than two noise floors from zero; a single faded cell is not significant. ${SCALE_TEXT} Drag over cells to select them, or click one cell.`,
         () => ({
           maps: mapsOf(state.criticism, state.axis),
           pick: state.pick,

@@ -7,6 +7,7 @@ import { equationDetails } from "../effects/equation.js";
 import { recordingsText } from "./chosen_recordings.js";
 import { axisNames } from "./dataset_rows.js";
 import { heldOutName } from "./first_models.js";
+import { floorText } from "./noise_floor.js";
 import { verdictLines } from "./verdict_lines.js";
 import {
   aliasNotice,
@@ -37,18 +38,6 @@ const VERDICTS = {
 const NONE_NAMED = ["Adequate: no effect is named", "good"];
 /** Evidence at which the meter is full, nats; its length is the logarithm, so that 70 and 20 000 differ. */
 const FULL_NATS = 1e5;
-
-/**
- * What the noise floor of a recording is computed from, by the name of its source in the answer.
- * @type {Record<string, string>}
- */
-const FLOORS = {
-  "within and between data sets": "by the scatter within and between data sets",
-  "within data sets, and by the data sheet": "by the scatter within data sets, and the drift of the data sheet",
-  "within data sets": "by the scatter within data sets",
-  repeats: "by data sets that repeat each other, at nearly equal rate and temperature; one number for all rates",
-  "scatter about a smooth surface": "by the scatter about a smooth surface; one number for all rates",
-};
 
 /**
  * Why a residual of more than one noise floor can be what noise and drift leave.
@@ -111,7 +100,7 @@ export function verdictCard(state, effects) {
             number(error.heldout_rms_dps),
             "deg/s",
           ],
-      ["Noise floor of a mean", number(error.noise_floor_dps), "deg/s", FLOORS[error.noise_floor_source] ?? null],
+      ["Noise floor of a mean", number(error.noise_floor_dps), "deg/s", floorText(error)],
       noise.drift_dps === null
         ? null
         : [
