@@ -132,8 +132,7 @@ class Advice(TypedDict):
     add: bool
     """Whether the exported calibration becomes better with the effect."""
     checked: bool
-    """Whether that is known; false: no part of the data can be left out, so that it is not known either whether it
-    becomes worse."""
+    """Whether that is known; false: no part of the data can be left out."""
     why: str
     """Why not to add it, or why that is not known; empty where `add` is true."""
     before_dps: float | None

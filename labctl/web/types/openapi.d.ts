@@ -2950,7 +2950,7 @@ export interface components {
             add: boolean;
             /**
              * Checked
-             * @description Whether that is known; false: no part of the data can be left out, so that it is not known either whether it becomes worse.
+             * @description Whether that is known; false: no part of the data can be left out.
              */
             checked: boolean;
             /**
