@@ -7,10 +7,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
 
 from tests.helpers.browser import Service, settled
-from tests.helpers.printed_page import sheets_of
+from tests.helpers.printed_page import pixels_of, sheets_of
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -63,6 +64,30 @@ def fitted(service: Service) -> Service:
     fit = {"recording": made["recording"], "effects": ["bias", "scale_factor"]}
     service.post("/api/units/FOG-0001/calibrations", fit)
     return service
+
+
+BARS = """() => [...document.querySelectorAll(".meter > i")].map((each) => {
+  const { width, height } = each.getBoundingClientRect();
+  return width * height;
+})"""
+#: That no figure has.
+GREEN = (1, 200, 3)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("fitted")
+def test_bars_of_evidence_are_filled_on_paper(visit: Callable[..., Page], tmp_path: Path) -> None:
+    """A browser prints no backgrounds unless it is told to, and a bar is one."""
+    page = visit("/explore?unit=FOG-0001", alone=True)
+    settled(page)
+    page.emulate_media(media="print")
+    page.set_viewport_size({"width": PAPER_PX, "height": 1000})
+    page.add_style_tag(content=f".meter > i {{ background: rgb{GREEN} }}")
+    areas = [area for area in page.evaluate(BARS) if area > 0]
+    assert len(areas) >= 3
+    sheets = pixels_of(page, tmp_path)
+    painted = sum(int((np.abs(sheet.astype(int) - GREEN).max(axis=2) < 8).sum()) for sheet in sheets)
+    assert 0.7 * sum(areas) < painted < 1.3 * sum(areas)
 
 
 HEADINGS = """() => [...document.querySelectorAll("main :is(h1, h2, h3)")].map((each) => each.textContent.trim())"""

@@ -81,8 +81,8 @@ def suspects_of(
 
     The ranking is that of `comparison`. Coefficients are those of a fit with the effect in its best shape (`shape_of`),
     the one that adding the effect makes; without that fit they are those of `fuller`, with the noise
-    that remains beside a fuller model. An effect whose fit leaves more than `before`, the fit of the model, is not
-    listed.
+    that remains beside a fuller model. Another shape of an effect that the model has is not listed where its fit leaves
+    more than `before`, the fit of the model.
     """
     probability = probabilities(comparison.candidates)
     effects = [c for c in comparison.candidates if not c.smooth]
@@ -91,7 +91,7 @@ def suspects_of(
     suspects = []
     for candidate in shown_candidates:
         after, refused = _fit_with(comparison, candidate, data, model, shape_of)
-        if after is not None and _is_worse(before, after):
+        if after is not None and candidate.id in model.effect_ids and _is_worse(before, after):
             continue  # another shape of an effect that the model has: what it would replace fits better
         share = _share(before, after, share_removed(fuller, candidate))
         fitted = _fitted_coefficients(after, candidate) if after and candidate.id not in model.effect_ids else {}

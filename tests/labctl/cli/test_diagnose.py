@@ -44,8 +44,9 @@ def ambiguous(tmp_path_factory: pytest.TempPathFactory) -> Lab:
 def test_one_experiment_names_the_cause(ambiguous: Lab, tmp_path: Path) -> None:
     lab = ambiguous.copy(tmp_path)
     output = lab.run("diagnose", UNIT, "--hours", "4").output
-    assert "round 1, 0.0 h: ambiguous: dead_band" in output
-    assert "next: more rates in the top third, at one temperature: 0.2 h on the bench" in output
+    named = "dead_band, scale_factor_odd, saturation, missed_steps"
+    assert f"round 1, 0.0 h: ambiguous: {named} (dead_band 42 %, scale_factor_odd 25 %, " in output
+    assert "next: more rates in the top third, at one temperature: 0.17 h on the bench" in output
     assert "if it is dead_band, this distinguishes it from scale_factor_odd, saturation, missed_steps" in output
     assert "round 2, 0.2 h: missing: dead_band" in output
     assert "One cause is left: dead_band, after 0.2 h on the bench." in output

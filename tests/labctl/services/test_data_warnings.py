@@ -124,7 +124,7 @@ def test_over_http_the_refusal_is_a_problem_document(tmp_path: Path) -> None:
         assert warning["text"] in refused.json()["detail"]
         made = client.post(path, json={"model": "ojeda2000", "accept_warnings": True})
         assert made.status_code == 201
-        assert made.json()["warnings"][0]["do"].startswith("correct the unit")
+        assert made.json()["warnings"][0]["do"].startswith("state rad/s as the unit of this output")
         assert client.get(f"{path}/1").json()["warnings"] == made.json()["warnings"]
 
 
