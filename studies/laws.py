@@ -12,8 +12,8 @@ channel is outside the range of the first. A proposal is good where both are at 
 error where the form of the law is known and only its size is fitted. *Worse* compares the root mean square of what is
 left of the other recording with the law and without it.
 
-In the last schedule an experiment is measured as well, at rates half-way between those of the recipe (2.2 h), and both
-recordings are criticised together.
+In the last two schedules an experiment is measured as well, at rates half-way between those of the recipe (2.2 h), once
+and five times, and all recordings are criticised together.
 
 `LABCTL_STUDY_SEEDS` is how many units each law and size has, `LABCTL_STUDY_NULLS` how many recordings of each schedule
 have nothing hidden, `LABCTL_STUDY_SEED` the first seed, `LABCTL_STUDY_WORKERS` the number of processes, and
@@ -76,6 +76,12 @@ class Schedule:
     changes: Mapping[str, object]
     other: Mapping[str, object]
     then: str = ""  #: the experiment that is measured as well, and criticised together with the first
+    times: int = 1  #: how often the experiment is measured
+
+    @property
+    def days(self) -> tuple[int, ...]:
+        """The recordings that are criticised together."""
+        return (0, *range(2, 2 + self.times)) if self.then else (0,)
 
 
 def _both_ways(*rates_dps: float) -> tuple[float, ...]:
@@ -95,19 +101,22 @@ SCHEDULES: dict[str, Schedule] = {
         {**SHUFFLED, "temperatures_c": (5.0, 12.0, 22.0, 38.0), "rates_dps": _both_ways(70, 140, 220, 340)},
     ),
     "single-axis, and between its rates": Schedule("ojeda2000-121", "single-axis-sim", {}, BETWEEN, "between_rates"),
+    "single-axis, and five times between its rates": Schedule(
+        "ojeda2000-121", "single-axis-sim", {}, BETWEEN, "between_rates", times=5
+    ),
 }  # fmt: skip
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=16)
 def recorded(schedule: str, seed: int, day: int) -> Recording:
     """Return a recording of a unit with nothing hidden: day 0 the one that is criticised, day 1 the other.
 
-    Day 2 is the experiment of the schedule.
+    From day 2 on it is the experiment of the schedule.
     """
     chosen = SCHEDULES[schedule]
     bench = load_bench(chosen.bench)
     recipe = load_recipe(chosen.recipe).model_copy(update=dict(chosen.other if day == 1 else chosen.changes))
-    if day == 2:
+    if day >= 2:
         changed = next(block for block in BLOCKS if block.id == chosen.then).changed(recipe)
         assert changed is not None
         recipe = changed
@@ -255,9 +264,8 @@ def with_law(case: Case, day: int) -> Recording:
 
 
 def criticised(case: Case) -> Recording:
-    """Return what is criticised of a case: its first recording, and that of its experiment where it has one."""
-    days = (0, 2) if SCHEDULES[case.schedule].then else (0,)
-    return joined_recording({day + 1: with_law(case, day) for day in days})
+    """Return what is criticised of a case: its first recording, and those of its experiment where it has one."""
+    return joined_recording({day + 1: with_law(case, day) for day in SCHEDULES[case.schedule].days})
 
 
 def outcome(case: Case) -> Outcome | None:

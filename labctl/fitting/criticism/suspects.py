@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -76,22 +76,24 @@ def suspects_of(
     model: ErrorModel,
     shape_of: Callable[[Comparison, Candidate], Term],
     before: FitResult | None = None,
+    named: Collection[str] = (),
 ) -> list[Suspect]:
     """Return what may be missing, best first; last what is of a size that the unit's technology cannot have.
 
     The ranking is that of `comparison`. Coefficients are those of a fit with the effect in its best shape (`shape_of`),
     the one that adding the effect makes; without that fit they are those of `fuller`, with the noise
-    that remains beside a fuller model. Another shape of an effect that the model has is not listed where its fit leaves
-    more than `before`, the fit of the model.
+    that remains beside a fuller model. What the verdict has `named` is listed; another effect only where its fit leaves
+    no more than `before`, the fit of the model.
     """
     probability = probabilities(comparison.candidates)
     effects = [c for c in comparison.candidates if not c.smooth]
-    shown_candidates = [c for c in effects if c.physical][:SHOWN]
+    physical = [c for c in effects if c.physical]
+    shown_candidates = [c for k, c in enumerate(physical) if k < SHOWN or c.id in named]
     shown_candidates += [c for c in effects if not c.physical and c.log_bf >= ENOUGH][:UNPHYSICAL_SHOWN]
     suspects = []
     for candidate in shown_candidates:
         after, refused = _fit_with(comparison, candidate, data, model, shape_of)
-        if after is not None and candidate.id in model.effect_ids and _is_worse(before, after):
+        if after is not None and candidate.id not in named and _is_worse(before, after):
             continue  # another shape of an effect that the model has: what it would replace fits better
         share = _share(before, after, share_removed(fuller, candidate))
         fitted = _fitted_coefficients(after, candidate) if after and candidate.id not in model.effect_ids else {}
