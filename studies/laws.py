@@ -92,18 +92,17 @@ SHUFFLED: Mapping[str, object] = {"temperature_order": "up_down", "rate_order": 
 BETWEEN: Mapping[str, object] = {
     "temperatures_c": (26.0, 29.0, 32.5, 36.0, 39.0, 42.0, 44.0), "rates_dps": _both_ways(12, 33, 50, 67, 90),
 }  # fmt: skip
+PUBLISHED: tuple[str, str, Mapping[str, object]] = ("ojeda2000-121", "single-axis-sim", {})
 #: The first is as published; the tri-axial one is the quick look with more rates, in another order.
 SCHEDULES: dict[str, Schedule] = {
-    "single-axis": Schedule("ojeda2000-121", "single-axis-sim", {}, BETWEEN),
+    "single-axis": Schedule(*PUBLISHED, BETWEEN),
     "single-axis, re-ordered": Schedule("ojeda2000-121", "single-axis-sim", SHUFFLED, {**SHUFFLED, **BETWEEN}),
     "tri-axial": Schedule(
         "quick-triaxial", "triaxial-sim", {**SHUFFLED, "rates_dps": _both_ways(40, 100, 180, 280, 400)},
         {**SHUFFLED, "temperatures_c": (5.0, 12.0, 22.0, 38.0), "rates_dps": _both_ways(70, 140, 220, 340)},
     ),
-    "single-axis, and between its rates": Schedule("ojeda2000-121", "single-axis-sim", {}, BETWEEN, "between_rates"),
-    "single-axis, and five times between its rates": Schedule(
-        "ojeda2000-121", "single-axis-sim", {}, BETWEEN, "between_rates", times=5
-    ),
+    "single-axis, and between its rates": Schedule(*PUBLISHED, BETWEEN, "between_rates"),
+    "single-axis, and five times between its rates": Schedule(*PUBLISHED, BETWEEN, "between_rates", times=5),
 }  # fmt: skip
 
 

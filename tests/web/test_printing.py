@@ -77,7 +77,7 @@ GREEN = (1, 200, 3)
 @pytest.mark.slow
 @pytest.mark.usefixtures("fitted")
 def test_bars_of_evidence_are_filled_on_paper(visit: Callable[..., Page], tmp_path: Path) -> None:
-    """A browser prints no backgrounds unless it is told to, and a bar is one."""
+    """A browser prints no backgrounds unless a style sheet says so, and a bar is one."""
     page = visit("/explore?unit=FOG-0001", alone=True)
     settled(page)
     page.emulate_media(media="print")

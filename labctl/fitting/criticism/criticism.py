@@ -212,8 +212,7 @@ def criticise(
     if not full or criticism.beside_missing is None:
         return criticism
     report_stage("listing suspects and residuals")
-    fuller, listed = criticism.beside_missing, criticism.verdict.named
-    suspects = tuple(suspects_of(comparison, fuller, fit_data, forward, refined_term, base, listed))
+    suspects = suspects_of(comparison, criticism.beside_missing, fit_data, forward, base, criticism.verdict.named)
     verdict, suspects = _without_weak_names(criticism, suspects, forward), without_shapes(suspects, forward)
     suspects = with_groups(suspects, verdict.groups)
     suspected = {*verdict.named, *(s.candidate.id for s in suspects if s.candidate.log_bf > 0)}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,6 +12,7 @@ from labctl.answers.fitted_model import Coefficient
 from labctl.errors import LabctlError
 from labctl.fitting.criticism.model_comparison import Comparison
 from labctl.fitting.criticism.ranking import Candidate
+from labctl.fitting.criticism.search.refinement import refined_term
 from labctl.fitting.criticism.verdict import (
     ENOUGH,
     alias_group,
@@ -20,7 +21,7 @@ from labctl.fitting.criticism.verdict import (
     share_removed,
 )
 from labctl.fitting.data.fit_data import FitData
-from labctl.fitting.effects import CATALOGUE, Effect, Term, kind_of
+from labctl.fitting.effects import CATALOGUE, Effect, kind_of
 from labctl.fitting.effects.derived import with_derived
 from labctl.fitting.estimation.fit import fit_preset
 from labctl.fitting.estimation.result import FitResult
@@ -74,16 +75,15 @@ def suspects_of(
     fuller: Comparison,
     data: FitData,
     model: ErrorModel,
-    shape_of: Callable[[Comparison, Candidate], Term],
-    before: FitResult | None = None,
-    named: Collection[str] = (),
-) -> list[Suspect]:
+    before: FitResult | None,
+    named: Collection[str],
+) -> tuple[Suspect, ...]:
     """Return what may be missing, best first; last what is of a size that the unit's technology cannot have.
 
-    The ranking is that of `comparison`. Coefficients are those of a fit with the effect in its best shape (`shape_of`),
-    the one that adding the effect makes; without that fit they are those of `fuller`, with the noise
-    that remains beside a fuller model. What the verdict has `named` is listed; another effect only where its fit leaves
-    no more than `before`, the fit of the model.
+    The ranking is that of `comparison`. Coefficients are those of a fit with the effect in its best shape, the one that
+    adding the effect makes; without that fit they are those of `fuller`, with the noise that remains beside a fuller
+    model. What the verdict has `named` is listed; another effect only where its fit leaves no more than `before`, the
+    fit of the model.
     """
     probability = probabilities(comparison.candidates)
     effects = [c for c in comparison.candidates if not c.smooth]
@@ -92,7 +92,7 @@ def suspects_of(
     shown_candidates += [c for c in effects if not c.physical and c.log_bf >= ENOUGH][:UNPHYSICAL_SHOWN]
     suspects = []
     for candidate in shown_candidates:
-        after, refused = _fit_with(comparison, candidate, data, model, shape_of)
+        after, refused = _fit_with(comparison, candidate, data, model)
         if after is not None and candidate.id not in named and _is_worse(before, after):
             continue  # another shape of an effect that the model has: what it would replace fits better
         share = _share(before, after, share_removed(fuller, candidate))
@@ -103,7 +103,7 @@ def suspects_of(
             alias_group(comparison, candidate) if candidate.log_bf >= ENOUGH else (candidate.id,), refused,
         )  # fmt: skip
         suspects.append(suspect)
-    return suspects
+    return tuple(suspects)
 
 
 def is_only_shape(suspect: Suspect, model: ErrorModel) -> bool:
@@ -168,18 +168,14 @@ def _p_value(comparison: Comparison, fuller: Comparison, candidate: Candidate) -
 
 
 def _fit_with(
-    comparison: Comparison,
-    candidate: Candidate,
-    data: FitData,
-    model: ErrorModel,
-    shape_of: Callable[[Comparison, Candidate], Term],
+    comparison: Comparison, candidate: Candidate, data: FitData, model: ErrorModel
 ) -> tuple[FitResult | None, str]:
     """Return a fit of the model with the candidate added, and why there is none: it is refused, or has no evidence."""
     if candidate.log_bf < 0 or candidate.term is None:
         return None, ""
     report_stage(f"fitting the model with {candidate.id}")
     try:
-        return fit_preset(data, changed(model, (shape_of(comparison, candidate),))), ""
+        return fit_preset(data, changed(model, (refined_term(comparison, candidate),))), ""
     except LabctlError as error:  # it cannot be determined beside the base, or not be inverted
         return None, str(error)
 
