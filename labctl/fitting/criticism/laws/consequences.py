@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from labctl.fitting.criticism.criticism import Criticism
-from labctl.fitting.criticism.laws.proposals import Law, added_dps, at_rates
+from labctl.fitting.criticism.laws.proposals import Law, added_dps, at_rates, where_finite
 from labctl.fitting.criticism.laws.shapes import TEMPERATURE
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.effects.formula import RATES, Formula
@@ -36,7 +37,7 @@ def consequences(law: Law, criticism: Criticism) -> list[str]:
         row = int(np.argmax(np.abs(channels.rate_dps(axis))))
         fastest_dps = float(abs(channels.rate_dps(axis)[row]))
         if (1 + FASTER) * fastest_dps <= (data.info.max_rate_dps or np.inf):
-            then = added_dps(law.fit, base, at_rates(channels, axis, 1 + FASTER), axis)
+            then = where_finite(partial(added_dps, law.fit, base, at_rates(channels, axis, 1 + FASTER), axis))
             sentences.append(_beyond(f"{(1 + FASTER) * fastest_dps:.4g} deg/s", then, added[axis], row))
     if any(TEMPERATURE in text for text in law.formulas):
         for sign, end in ((1, "warmest"), (-1, "coldest")):
@@ -44,11 +45,14 @@ def consequences(law: Law, criticism: Criticism) -> list[str]:
             warm_c = data.temperature_c + sign * BEYOND_K
             moved = replace(channels, columns={**channels.columns, TEMPERATURE: warm_c})
             at = f"{warm_c[row]:.4g} deg C, {BEYOND_K:g} K beyond the {end} data set"
-            sentences.append(_beyond(at, added_dps(law.fit, base, moved, axis), added[axis], row))
+            then = where_finite(partial(added_dps, law.fit, base, moved, axis))
+            sentences.append(_beyond(at, then, added[axis], row))
     return sentences
 
 
-def _beyond(where: str, then: Array, now: Array, row: int) -> str:
+def _beyond(where: str, then: Array | None, now: Array, row: int) -> str:
+    if then is None:
+        return f"At {where}, where nothing was measured, it has no finite value: it describes the measured range only."
     return (
         f"At {where}, where nothing was measured, it would add {then[row]:.3g} deg/s to what the model expects; at the "
         f"nearest data set it adds {now[row]:.3g} deg/s."

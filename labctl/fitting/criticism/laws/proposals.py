@@ -6,13 +6,14 @@ catalogue explains a residual, and only where the data that a fit has not seen a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from labctl.answers.fitted_model import Coefficient
-from labctl.errors import LabctlError
+from labctl.errors import BadInput, LabctlError
 from labctl.fitting.criticism.criticism import Criticism
 from labctl.fitting.criticism.laws.search import Search, State
 from labctl.fitting.criticism.laws.shapes import TABLE_RATE, TEMPERATURE, library, scales_of
@@ -33,6 +34,8 @@ from labctl.progress import report_stage
 MAX_LAWS, MAX_TRIED = 5, 16
 #: Channels besides the rate that a law may depend on, the first of those that the residual follows.
 MAX_CHANNELS = 2
+#: A temperature that moved by less than this, K, was held: what it did is the noise of a chamber.
+MIN_SPAN_K = 1.0
 #: Two laws are one where what they take off the data sets is so alike.
 ALIKE = 0.9995
 #: A law is not proposed that has this much less evidence than the best, nats: a hundredth of its probability.
@@ -127,7 +130,9 @@ def breaking(laws: Sequence[Law], criticism: Criticism) -> Breaking | None:
         rate_dps = data.true_rate_dps(axis)
         for share in BETWEEN:
             channels = at_rates(data.channels, axis, share)
-            first, second = (law.fit.fitted.error_dps(channels, axis) for law in laws[:2])
+            first, second = (where_finite(partial(law.fit.fitted.error_dps, channels, axis)) for law in laws[:2])
+            if first is None or second is None:
+                continue
             apart = np.where(np.abs(share * rate_dps) <= limit_dps, np.abs(first - second), 0.0)
             row = int(np.argmax(apart))
             if float(apart[row]) > most.difference_dps:
@@ -139,14 +144,17 @@ def breaking(laws: Sequence[Law], criticism: Criticism) -> Breaking | None:
 def _channels(criticism: Criticism) -> list[str]:
     """Return the rate, and the first channels that the residual follows; the temperature where it follows none.
 
-    A channel that moved with the temperature is left out: the schedule does not say which of the two it is.
+    A temperature that was held is left out, and so is a channel that moved with the temperature: the schedule does not
+    say which of the two it is.
     """
     follows = [
         name
         for name in criticism.verdict.depends_on
         if name != TABLE_RATE and not _moved_with_temperature(criticism, name)
     ]
-    if TEMPERATURE not in follows[:MAX_CHANNELS]:
+    if np.ptp(criticism.fit_data.temperature_c) < MIN_SPAN_K:
+        follows = [name for name in follows if name != TEMPERATURE]
+    elif TEMPERATURE not in follows[:MAX_CHANNELS]:
         follows = [*follows[: MAX_CHANNELS - 1], TEMPERATURE]
     return [TABLE_RATE, *follows[:MAX_CHANNELS]]
 
@@ -170,6 +178,14 @@ def added_dps(fit: FitResult, base: FitResult, channels: Channels, axis: str) ->
     return fit.fitted.error_dps(channels, axis) - base.fitted.error_dps(channels, axis)
 
 
+def where_finite(expected: Callable[[], Array]) -> Array | None:
+    """Return what a law expects; None where a formula of it has no finite value, as far beyond the data."""
+    try:
+        return expected()
+    except BadInput:
+        return None
+
+
 def at_rates(channels: Channels, axis: str, share: float) -> Channels:
     """Return channels with a share of the rates about one axis."""
     return channels.with_rates({**channels.rates, axis: share * channels.rate_dps(axis)})
@@ -181,8 +197,8 @@ def _goes_astray(criticism: Criticism, base: FitResult, fit: FitResult) -> bool:
     for axis in criticism.fit_data.outputs:
         most = ASTRAY * float(np.abs(added_dps(fit, base, channels, axis)).max(initial=0.0))
         for share in (share for share in BETWEEN if share <= 1.0):
-            between = added_dps(fit, base, at_rates(channels, axis, share), axis)
-            if float(np.abs(between).max(initial=0.0)) > most:
+            between = where_finite(partial(added_dps, fit, base, at_rates(channels, axis, share), axis))
+            if between is None or float(np.abs(between).max(initial=0.0)) > most:
                 return True
     return False
 

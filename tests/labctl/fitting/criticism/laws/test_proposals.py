@@ -9,8 +9,10 @@ import pytest
 
 from labctl.fitting.criticism import Criticism, Law, breaking, coefficients_of_law, consequences, criticise, laws_of
 from labctl.fitting.data.fit_data import fit_data_of
+from labctl.fitting.effects import Term
 from labctl.fitting.effects.formula import read_formula
-from labctl.fitting.models.presets import usual_model
+from labctl.fitting.estimation.fit import fit_preset
+from labctl.fitting.models.presets import changed, preset_for, usual_model
 from labctl.recording import Recording, to_points
 from tests.helpers.simulated_recordings import single_axis
 from tests.helpers.unnamed_error import SIZE_DPS, error_dps, with_wave
@@ -79,3 +81,29 @@ def test_nothing_is_proposed_for_noise() -> None:
     quiet = judged(single_axis(4))
     assert quiet.verdict.form == "adequate"
     assert laws_of(quiet) == []
+
+
+def test_a_law_without_a_finite_value_beyond_the_data_is_one_of_the_measured_range() -> None:
+    found = judged(single_axis(3))
+    assert found.base is not None
+    pole_c = float(found.fit_data.temperature_c.max()) + 10.0
+    steep = Term("law_1", formula=f"1/({pole_c!r} - temperature_c)")
+    fit = fit_preset(found.fit_data, changed(found.base.fitted.model, (steep,)))
+    law = Law((steep,), ("pole",), 10.0, 1.0, fit, {})
+    said = consequences(law, found)
+    assert said[0] == "It does not depend on the rate."
+    assert "10 K beyond the warmest data set, where nothing was measured, it has no finite value" in said[1]
+    assert "10 K beyond the coldest data set, where nothing was measured, it would add" in said[2]
+    assert breaking([law, replace(law, fit=found.base)], found) is not None  # at the temperatures of the data sets
+
+
+@pytest.mark.slow
+def test_a_temperature_that_was_held_is_in_no_law() -> None:
+    whole = with_wave(single_axis(3))
+    warm_c = np.asarray(whole.columns["chamber_setpoint_c"])
+    held = {name: np.asarray(values)[warm_c == warm_c[0]] for name, values in whole.columns.items()}
+    recording = replace(whole, columns=held)
+    model, _ = preset_for("single_temperature", []).build(fit_data_of(to_points(recording)))
+    formulas = [text for law in laws_of(criticise(recording, model)) for text in law.formulas]
+    assert formulas
+    assert not [text for text in formulas if "temperature_c" in text]
