@@ -13,6 +13,10 @@ from labctl.recording.points import dataset_starts
 SHARE, MIN_DPS = 0.01, 0.05
 #: Pieces of a data set whose mean rates are compared, and noises of such a mean that do not count.
 PIECES, NOISES = 8, 6.0
+#: The shortest pieces have so many readings: single wrong ones do not move their median.
+MIN_READINGS = 16
+#: A table's ripple within a data set is at most this share of the rate plus this much, deg/s.
+RIPPLE, RIPPLE_DPS = 0.05, 0.5
 
 
 class RateChange(NamedTuple):
@@ -50,11 +54,25 @@ def rate_change(
 
 
 def _is_sustained(rate: NDArray[np.float64], allowed: float) -> bool:
-    """Whether rates (n,) of one data set differ for longer than single readings do by noise."""
+    """Whether rates (n,) of one data set differ for longer than single readings do by noise.
+
+    Pieces of an eighth show a rate that drifts. Shorter ones show a motion that repeats, whose eighths may have one
+    mean; by them ripple of a table is no motion.
+    """
     if len(rate) < 2 * PIECES:
         return True
-    edges = np.linspace(0, len(rate), PIECES + 1).astype(np.int64)
-    means = np.add.reduceat(rate, edges[:-1]) / np.diff(edges)
     steps = np.abs(np.diff(rate))
     noise = float(np.sqrt(np.mean(np.sort(steps)[: int(0.9 * len(steps))] ** 2) / 2))
-    return bool(np.ptp(means) > allowed + NOISES * noise / np.sqrt(len(rate) / PIECES))
+    edges = np.linspace(0, len(rate), PIECES + 1).astype(np.int64)
+    means = np.add.reduceat(rate, edges[:-1]) / np.diff(edges)
+    if np.ptp(means) > allowed + NOISES * noise / np.sqrt(len(rate) / PIECES):
+        return True
+    ripple = RIPPLE * float(np.abs(rate).max()) + RIPPLE_DPS
+    size = len(rate) // (4 * PIECES)
+    while size >= MIN_READINGS:
+        pieces = len(rate) // size
+        medians = np.median(rate[: pieces * size].reshape(pieces, size), axis=1)
+        if np.ptp(medians) > ripple + 2 * NOISES * noise / np.sqrt(size):
+            return True
+        size //= 4
+    return False

@@ -198,3 +198,23 @@ def test_a_change_is_found_in_noise_with_its_row() -> None:
     assert change is not None
     assert (change.dataset, change.row) == (11, 1150)
     assert change.after_dps == pytest.approx(60, abs=1)
+
+
+@pytest.mark.parametrize("noise_dps", [0.0, 30.0])
+def test_a_motion_that_repeats_is_no_constant_rate_although_each_part_has_the_same_mean(noise_dps: float) -> None:
+    """Rates of both directions at eight temperatures, logged as one: each eighth is one temperature."""
+    once = np.repeat([0.0, 100.0, -100.0, 300.0, -300.0], 200)
+    rate = np.tile(once, 8) + noise_dps * np.random.default_rng(4).normal(size=8000)
+    change = rate_change(np.ones(8000, dtype=np.int64), rate, np.ones(8000, dtype=bool))
+    assert change is not None
+    assert change.dataset == 1
+    if noise_dps == 0:
+        assert (change.row, change.before_dps, change.after_dps) == (200, 0.0, 100.0)
+
+
+def test_ripple_and_the_noise_of_an_encoder_are_no_motion() -> None:
+    t_s = np.arange(20_000) / 100.0
+    rippling = 40.0 * (1 + 0.02 * np.sin(2 * np.pi * t_s / 3.0))
+    noisy = 40.0 + 20.0 * np.random.default_rng(5).normal(size=20_000)
+    for rate in (rippling, noisy):
+        assert rate_change(np.ones(20_000, dtype=np.int64), rate, np.ones(20_000, dtype=bool)) is None
