@@ -23,6 +23,9 @@ _ROOM_C, _ROOM_F, _ROOM_K = (10.0, 50.0), (59.0, 95.0), (280.0, 325.0)
 _NO_FAHRENHEIT = 55.0
 #: Readings per second that a log has where its unit of time is not stated.
 SLOWEST_HZ, FASTEST_HZ = 0.5, 8192.0
+#: Means at constant rates, one row each: so many rows or more, so far apart at least, s, of which at least this share
+#: differ from the row before by more than this share of the range of the rates.
+MIN_MEANS, SLOW_S, JUMPING, JUMP = 5, 2.0, 0.5, 0.02
 #: Units that the numbers of a clock may be in; a date comes first, since a clock since power-on is seldom as large.
 _DATES = ("epoch s", "epoch ms", "epoch us", "epoch ns", "filetime", "excel days", "datenum")
 _CLOCKS = (*_DATES, "s", "ms", "us", "ns")
@@ -75,6 +78,21 @@ def _is_possible(name: str, values: Array, step: float, temperature_c: Array | N
         return True
     passed = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(values)))])  # of a clock that was set back too
     return not too_steep(passed * unit.factor, temperature_c)
+
+
+def means_at_rates(t_s: Array, rate: Array) -> str:
+    """Return what shows that each row (n,) is a mean at a rate of its own, and no reading of a motion; "" if nothing.
+
+    A log that follows a motion has several readings while the rate changes: here it jumps from row to row.
+    """
+    if len(rate) < MIN_MEANS or not np.all(np.isfinite(rate)):
+        return ""
+    step_s, jumps = usual_step(t_s), np.abs(np.diff(rate))
+    span = float(np.ptp(rate))
+    jumping = float(np.mean(jumps > JUMP * span))
+    if step_s < SLOW_S or span == 0 or jumping < JUMPING:
+        return ""
+    return f"the rate jumps from row to row, {step_s:.4g} s apart"
 
 
 def usual_step(values: Array) -> float:

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.recording.column_map.dates import is_date
-from labctl.recording.column_map.guesses import Guess, force_unit, temperature_unit, time_unit
+from labctl.recording.column_map.dates import instants, is_date
+from labctl.recording.column_map.guesses import Guess, force_unit, means_at_rates, temperature_unit, time_unit
 from labctl.recording.column_map.model import (
     QUANTITY_COLUMNS,
     ColumnMap,
@@ -40,6 +40,8 @@ from labctl.recording.raw_table import RawColumn, RawTable
 Array = NDArray[np.float64]
 #: A data set of one rate has at least so many readings on average.
 MIN_READINGS = 10
+#: No campaign has more means than this; to read the times of a long log takes long.
+MOST_MEANS = 100_000
 #: A log in bursts: gaps of at least so many usual steps, and of so many seconds.
 GAP_STEPS, GAP_S = 100.0, 30.0
 _SEPARATORS = {"\t": "tab", " ": "space"}
@@ -68,7 +70,7 @@ def propose(table: RawTable, serial: str | None = None, units_given: Units | Non
         columns = _by_names(table, guesses, units_given)
     columns = {target: _in_stated(target, mapped, units_given) for target, mapped in columns.items()}
     sources_by_target = {target: table.columns[str(mapped.source)] for target, mapped in columns.items()}
-    kind = "samples" if "t_s" in columns or "table_rate_dps" not in columns else "points"
+    kind = "samples" if "table_rate_dps" not in columns or _is_log(columns, sources_by_target, guesses) else "points"
     _guess_force(columns, sources_by_target, guesses)
     proposed = ColumnMap(
         serial=serial or serial_of(table),
@@ -78,6 +80,25 @@ def propose(table: RawTable, serial: str | None = None, units_given: Units | Non
         datasets=_data_sets(table, columns, sources_by_target) if kind == "samples" else DataSets(),
     )
     return Proposal(proposed, guesses)
+
+
+def _is_log(
+    columns: Mapping[str, MappedColumn], sources_by_target: Mapping[str, RawColumn], guesses: list[str]
+) -> bool:
+    """Whether the rows of a file with the table's rate are readings over time, and not means at one rate each."""
+    if "t_s" not in columns:
+        return False
+    column, rate = sources_by_target["t_s"], sources_by_target["table_rate_dps"]
+    unit = find_unit("s", columns["t_s"].unit or column.unit)
+    if unit is None or rate.words is not None or len(rate.values) > MOST_MEANS:
+        return True
+    try:
+        t_s = unit.factor * column.values if column.words is None else instants(column.words.tolist(), unit.name).t_s
+    except ValueError:
+        return True
+    if why := means_at_rates(t_s, rate.values):
+        guesses.append(f'rows taken for means at constant rates ({why}); if they are readings, write kind = "samples"')
+    return not why
 
 
 def completed(table: RawTable, column_map: ColumnMap) -> Proposal:
