@@ -12,6 +12,7 @@ from scipy.special import chdtrc
 
 from labctl.answers.criticism import Advice, NotTestable, SlowProcess
 from labctl.answers.views import Views
+from labctl.fitting.criticism import residual_limits
 from labctl.fitting.criticism.advice import advice_for, is_carried
 from labctl.fitting.criticism.candidates import beside_held
 from labctl.fitting.criticism.diagnostics import views_of
@@ -82,8 +83,6 @@ MIN_SPARE = 6
 LARGE_DRIFT = 1.5
 #: From this chance on that noise leaves as much as a residual, the residual may be noise.
 BY_CHANCE = 0.05
-#: No model is adequate that leaves more than this many times the noise floor, whatever the evidence for any one cause.
-MAX_OVER_FLOOR = 3.0
 
 
 @dataclass(frozen=True)
@@ -204,7 +203,7 @@ def criticise(
     seen = data.through(response_of_terms(forward.terms))
     comparison = compare_models(beside_held(seen, forward), forward, catalogue)
     verdict, initial, final = search_stepwise(comparison, catalogue)
-    verdict = _without_large_residual(_beyond_noise(verdict, initial), base)
+    verdict = residual_limits.applied(verdict, initial, fit_data, forward, base)
     family, hint = family_or_hint(fit_data, forward, verdict)
     verdict = with_family(verdict, family)
     named = Criticism(verdict, data, fit_data, base, None, comparison, final, family=family, hint=hint)
@@ -288,20 +287,6 @@ def _to_check(comparison: Comparison, verdict: Verdict, group: tuple[str, ...]) 
     return next((term for term in others if is_carried(term)), leader)
 
 
-def _beyond_noise(verdict: Verdict, initial: Comparison) -> Verdict:
-    """Return the verdict, or "unexplained" in place of an adequate model beside far evidence for what is not physical.
-
-    The evidence says that more than noise is left; that the size of the nearest effect is impossible says that the
-    effect is not its cause, and not that there is none.
-    """
-    if verdict.form != "adequate":
-        return verdict
-    doubtful = [c for c in initial.candidates if not c.smooth and not c.physical and c.log_bf >= FAR]
-    if not doubtful:
-        return verdict
-    return replace(verdict, form="unexplained", further=(), not_physical=tuple(c.id for c in doubtful))
-
-
 def _with_time_constants(
     family: ThermalFamily | None, data: FitData, forward: ErrorModel
 ) -> ThermalFamily | None:  # fmt: skip
@@ -336,16 +321,6 @@ def _without_weak_names(criticism: Criticism, suspects: Sequence[Suspect], forwa
         further = tuple(group for group in groups if not set(group) <= shapes)
         return Verdict("adequate", further=further)
     return replace(verdict, groups=groups)  # what was ambiguous stays so: fewer names are no more certain
-
-
-def _without_large_residual(verdict: Verdict, base: FitResult | None) -> Verdict:
-    """Return the verdict, or "unexplained" in place of an adequate model whose residual is far above the floor."""
-    if verdict.form != "adequate" or base is None:
-        return verdict
-    left, floor = base.error.rms_dps, base.error.noise_floor_dps
-    if left is None or not floor or left <= MAX_OVER_FLOOR * floor:
-        return verdict
-    return replace(verdict, form="unexplained", further=())
 
 
 def _forward(data: FitData, model: ErrorModel, base: FitResult | None) -> ErrorModel:

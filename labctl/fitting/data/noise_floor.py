@@ -32,6 +32,8 @@ REPEATS_NEEDED = 8
 MIN_SETS = 16
 #: Where the noise floor is from: white noise of the readings beside a drift that no data sets show.
 BY_DATA_SHEET = "within data sets, and by the data sheet"
+#: ... and from data sets at nearly the same rate and temperature, where there are no readings.
+BY_REPEATS = "repeats"
 #: Probability at which noise alone is taken for a law that no smooth function of temperature follows.
 FALSE_ALARM = 1e-4
 
@@ -79,7 +81,7 @@ def noise_floor_of(channels: Channels, errors_dps: Mapping[str, Array], scatter:
     m = len(channels)
     repeats = repeats_dps(channels, residuals_dps)
     if repeats is not None:
-        return _of_scatter(m, dict.fromkeys(errors_dps, repeats), "repeats")
+        return _of_scatter(m, dict.fromkeys(errors_dps, repeats), BY_REPEATS)
     about = {axis: _scatter_dps(residuals_dps[axis], surfaces[axis]) for axis in residuals_dps}
     noise = {axis: value for axis, value in about.items() if value is not None}
     if len(noise) < len(about):
