@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from labctl.fitting.criticism import criticise
-from labctl.fitting.criticism.criticism import MAX_OVER_FLOOR
+from labctl.fitting.criticism.residual_limits import MAX_OVER_FLOOR
 from labctl.fitting.estimation.fit import fit
 from labctl.recording import Recording
 from labctl.services.criticism.answer import sentences
