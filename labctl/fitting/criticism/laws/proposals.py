@@ -20,6 +20,7 @@ from labctl.fitting.criticism.laws.shapes import TABLE_RATE, TEMPERATURE, librar
 from labctl.fitting.criticism.model_comparison import Comparison
 from labctl.fitting.criticism.search.held_out import held_out_rises
 from labctl.fitting.data.channels import Channels
+from labctl.fitting.data.temperature.levels import ONE_LEVEL_SPAN_C
 from labctl.fitting.effects import Term
 from labctl.fitting.effects.formula import Formula
 from labctl.fitting.estimation.fit import fit_preset
@@ -34,8 +35,6 @@ from labctl.progress import report_stage
 MAX_LAWS, MAX_TRIED = 5, 16
 #: Channels besides the rate that a law may depend on, the first of those that the residual follows.
 MAX_CHANNELS = 2
-#: A temperature that moved by less than this, K, was held: what it did is the noise of a chamber.
-MIN_SPAN_K = 1.0
 #: Two laws are one where what they take off the data sets is so alike.
 ALIKE = 0.9995
 #: A law is not proposed that has this much less evidence than the best, nats: a hundredth of its probability.
@@ -152,7 +151,7 @@ def _channels(criticism: Criticism) -> list[str]:
         for name in criticism.verdict.depends_on
         if name != TABLE_RATE and not _moved_with_temperature(criticism, name)
     ]
-    if np.ptp(criticism.fit_data.temperature_c) < MIN_SPAN_K:
+    if np.ptp(criticism.fit_data.temperature_c) <= ONE_LEVEL_SPAN_C:
         follows = [name for name in follows if name != TEMPERATURE]
     elif TEMPERATURE not in follows[:MAX_CHANNELS]:
         follows = [*follows[: MAX_CHANNELS - 1], TEMPERATURE]
