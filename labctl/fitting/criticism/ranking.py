@@ -11,7 +11,7 @@ from labctl.fitting.criticism.candidate_shape import CandidateShape
 from labctl.fitting.criticism.evidence.bayes_factors import AxisEvidence
 from labctl.fitting.criticism.evidence.design import Design
 from labctl.fitting.criticism.evidence.gains import solve_option
-from labctl.fitting.effects import CATALOGUE, Term
+from labctl.fitting.effects import CATALOGUE, Effect, Term
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.log_evidence import mean_evidence, on_all_axes_or_one
 from labctl.shown_unit import shown_unit
@@ -54,9 +54,14 @@ def largest_plausible(effect_id: str, technology: str) -> float | None:
 
     Of an unknown `technology` ("") the largest of all.
     """
-    ranges = CATALOGUE[effect_id].ranges
-    spans = [ranges[technology]] if technology in ranges else [] if technology else list(ranges.values())
-    return max((max(abs(low), abs(high)) for low, high in spans), default=None)
+    return max((max(abs(low), abs(high)) for low, high in _spans(CATALOGUE[effect_id], technology)), default=None)
+
+
+def _spans(kind: Effect, technology: str) -> list[tuple[float, float]]:
+    """Return the spans of plausible sizes: of a technology, of an unknown one ("") those of all."""
+    if technology in kind.ranges:
+        return [kind.ranges[technology]]
+    return [] if technology else list(kind.ranges.values())
 
 
 def largest_physical(effect_id: str, unit_symbol: str, technology: str) -> float:
@@ -73,10 +78,10 @@ def largest_physical(effect_id: str, unit_symbol: str, technology: str) -> float
 def _has_wrong_sign(option: CandidateShape, value: float, least: float, technology: str) -> bool:
     """Return whether a coefficient is clearly of a sign that its effect cannot have: more output beyond a knee."""
     kind = CATALOGUE[option.term.effect] if option.term is not None else None
-    if kind is None or not kind.one_sign or technology not in kind.ranges or not least > 0:
+    if kind is None or not kind.one_sign or not least > 0:
         return False
-    low, high = kind.ranges[technology]
-    return (value < 0 <= low) or (value > 0 >= high)
+    spans = _spans(kind, technology)
+    return bool(spans) and all((value < 0 <= low) or (value > 0 >= high) for low, high in spans)
 
 
 def _is_beyond_all(option: CandidateShape, least: Array) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import pytest
 
@@ -143,7 +144,11 @@ def test_a_size_of_a_sign_that_an_effect_cannot_have_is_outside() -> None:
 
 def test_what_grows_beyond_the_rate_is_no_saturation() -> None:
     """The same bend with the other sign: no output of a gyro has it."""
-    assert "saturation" not in held(single_axis(3, saturation=0.02)).verdict.named
+    recording = single_axis(3, saturation=0.02)
+    assert recording.info.technology is not None
+    unstated = replace(recording, info=recording.info.model_copy(update={"technology": None}))
+    for each in (recording, unstated):  # a sign that no technology has is none of an unknown one
+        assert "saturation" not in held(each).verdict.named
 
 
 def hidden(protocol: str, effect: str, z: int, seed: int) -> Verdict:
