@@ -50,13 +50,13 @@ def printed_page(service: Service, number: str) -> str:
     return f"{address.path}?{address.query}"
 
 
-def test_a_diagnosis_without_a_bench_is_refused_before_anything_is_asked(visit: Callable[..., Page]) -> None:
+def test_without_a_bench_no_diagnosis_is_offered_and_the_page_says_why(visit: Callable[..., Page]) -> None:
     from playwright.sync_api import expect
 
     page = visit(f"/units/{SERIAL}")
-    page.get_by_role("button", name="Diagnose").click()
-    expect(page.get_by_text("This service drives no bench, so it runs no experiment")).to_be_visible()
-    expect(page.get_by_role("dialog")).to_have_count(0)
+    found = page.get_by_role("region", name="Diagnosis by experiments")
+    expect(found.get_by_text("This service drives no bench, so it runs no experiment")).to_be_visible()
+    expect(page.get_by_role("button", name="Diagnose")).to_have_count(0)
 
 
 @pytest.mark.parametrize("keys", [True])

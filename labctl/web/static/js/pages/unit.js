@@ -57,13 +57,14 @@ export async function page({ params, signal }) {
     each.length ? get("/api/units/{serial}/ladder", { path, signal }) : null,
   );
   asking.catch(() => {}); // shown where it is awaited
-  const [rows, history, issued, waiting, sensors, diagnoses] = await Promise.all([
+  const [rows, history, issued, waiting, sensors, diagnoses, benches] = await Promise.all([
     calibrations,
     get("/api/units/{serial}/certifications", { path, signal }),
     get("/api/units/{serial}/certificates", { path, signal }),
     get("/api/units/{serial}/release-requests", { path, signal }),
     get("/api/units/{serial}/sensors", { path, signal }),
     get("/api/units/{serial}/diagnoses", { path, signal }),
+    get("/api/benches", { signal }),
   ]);
   const force = history.find((act) => act.version === unit.certified_version && act.act === "certify");
   const explore = `/explore?unit=${encodeURIComponent(unit.serial)}`;
@@ -84,7 +85,7 @@ export async function page({ params, signal }) {
       ? [
           versionsCard(unit, rows, issued, history, explore),
           ladder(asking),
-          diagnosisCard(unit.serial, diagnoses, signal),
+          diagnosisCard(unit.serial, diagnoses, benches, signal),
           unit.recordings.length > 1 ? trendCard(unit.serial, rows, signal) : null,
           ...versionCards(unit.serial, rows, unit.certified_version, signal),
         ]

@@ -3,7 +3,7 @@
 import { get, post } from "../core/http/api.js";
 import { h, setChildren } from "../core/elements.js";
 import { idText, inWords } from "../core/format.js";
-import { actButton, cardWithHeader, chip, table, toast, withCommands } from "../core/components.js";
+import { actButton, cardWithHeader, chip, table, withCommands } from "../core/components.js";
 import { dialog } from "../core/dialog.js";
 import { NO_BENCH, WITH_BENCH } from "../core/no_bench.js";
 import { visitSignal } from "../core/router.js";
@@ -15,23 +15,30 @@ import { diagnosisState, effectsOfRounds, lineOfRound, suspectColumns } from "./
 /** How often a diagnosis that goes on is read again, ms. */
 const POLL_MS = 2000;
 
-/** Said at once, and not after the hours were asked for. */
 const NO_EXPERIMENT = `${NO_BENCH}, so it runs no experiment: start it with ${WITH_BENCH.real}, or with --simulate for a simulated bench.`;
 
 /**
- * A card of the newest diagnosis, with the button that starts one; it is read again as long as it goes on.
+ * A card of the newest diagnosis, with the button that starts one, or why this service cannot; it is read again as long
+ * as it goes on.
  * @param {string} serial
  * @param {readonly Diagnosis[]} diagnoses newest first
+ * @param {readonly Bench[]} benches of this service
  * @param {AbortSignal} signal
  */
-export function diagnosisCard(serial, diagnoses, signal) {
+export function diagnosisCard(serial, diagnoses, benches, signal) {
   const place = h("div");
+  const reason = cannotMeasure(serial, benches);
   /** @param {readonly Diagnosis[]} rows */
   const draw = (rows) => {
     const newest = rows[0];
-    setChildren(place, newest ? rounds(newest) : explanation(), newest && !newest.ended ? acts(newest, again) : null);
-    setChildren(beside, !newest || newest.ended ? startButton(serial, again) : null);
-    if (newest && !newest.ended && !signal.aborted) setTimeout(() => signal.aborted || again(), POLL_MS);
+    const isOpen = newest && !newest.ended;
+    setChildren(
+      place,
+      newest ? rounds(newest) : explanation(),
+      isOpen ? acts(newest, again) : reason ? h("p", { class: "muted" }, reason) : null,
+    );
+    setChildren(beside, isOpen || reason ? null : startButton(serial, again));
+    if (isOpen && !signal.aborted) setTimeout(() => signal.aborted || again(), POLL_MS);
   };
   const beside = h("div");
   const again = async () => draw(await get("/api/units/{serial}/diagnoses", { path: { serial }, signal }));
@@ -163,12 +170,6 @@ export function cannotMeasure(serial, [bench]) {
  */
 const startButton = (serial, again) =>
   actButton("Diagnose", async () => {
-    const left = visitSignal();
-    const reason = cannotMeasure(serial, await get("/api/benches", { signal: left }));
-    if (reason) {
-      toast("bad", reason);
-      return;
-    }
     const answers = await dialog(
       "Run experiments until one missing effect is left?",
       [{ name: "hours", label: "Hours on the bench, at most", value: "24" }],
