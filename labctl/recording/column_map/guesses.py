@@ -83,7 +83,8 @@ def _is_possible(name: str, values: Array, step: float, temperature_c: Array | N
 def means_at_rates(t_s: Array, rate: Array) -> str:
     """Return what shows that each row (n,) is a mean at a rate of its own, and no reading of a motion; "" if nothing.
 
-    A log that follows a motion has several readings while the rate changes: here it jumps from row to row.
+    The rates may be in any unit, the same for all. A log that follows a motion has several readings while the rate
+    changes: here it jumps from row to row.
     """
     if len(rate) < MIN_MEANS or not np.all(np.isfinite(rate)):
         return ""

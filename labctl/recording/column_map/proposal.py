@@ -97,7 +97,8 @@ def _is_log(
     except ValueError:
         return True
     if why := means_at_rates(t_s, rate.values):
-        guesses.append(f'rows taken for means at constant rates ({why}); if they are readings, write kind = "samples"')
+        readings = 'if they are readings, write kind = "samples" in the map'
+        guesses.append(f"rows taken for means at constant rates ({why}); {readings}")
     return not why
 
 

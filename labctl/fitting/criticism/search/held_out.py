@@ -115,8 +115,8 @@ class _Axis:
         ):
             values = _solved(rows[in_fit], self.y[in_fit], prior)
             residual = np.where(left_out, self.y - rows @ values, 0.0)
-            followed = base @ _solved(base[data.present], residual[data.present], precision)
-            axis_errors.append(float(np.sum(residual * (residual - followed))))
+            followed = base[left_out] @ _solved(base[data.present], residual[data.present], precision)
+            axis_errors.append(float(residual[left_out] @ (residual[left_out] - followed)))
         return axis_errors[0], axis_errors[1]
 
 

@@ -44,7 +44,7 @@ def test_rates_that_jump_from_row_to_row_are_means(tmp_path: Path, head: str) ->
     (text,) = [each for each in guesses if "means" in each]
     assert text == (
         "rows taken for means at constant rates (the rate jumps from row to row, 25 s apart); if they are readings, "
-        'write kind = "samples"'
+        'write kind = "samples" in the map'
     )
 
 
