@@ -31,8 +31,8 @@ SILENT_S = 6.0
 BUSY_EXTRA_S = 60.0
 #: Delay of a check above which its result is not used: the supervisor itself did not run, s.
 MAX_DELAY_S = 1.0
-#: Time within which the web process ends, with its requests, s.
-ENDS_WITHIN_S = 4.0
+#: Time within which the web process ends, with its requests, and how much more where it gets no processor, s.
+ENDS_WITHIN_S, EXCUSED_S = 4.0, 10.0
 
 
 class WebKeeper:
@@ -91,7 +91,11 @@ class WebKeeper:
         """End the process, and give the address back."""
         self.end_soon()
         self._process.signal(signal.SIGTERM)
-        self._process.wait(ENDS_WITHIN_S)
+        ending = Silence(self.pid, EXCUSED_S)
+        while not self._process.wait(CHECK_EVERY_S):
+            if ending.s > ENDS_WITHIN_S:
+                log.error("child.silent", child="web", child_pid=self.pid, asked_to_end=True)
+                break
         self._process.kill()
         self._closed.set()
         if self._thread.is_alive():

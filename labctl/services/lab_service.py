@@ -130,7 +130,7 @@ class LabService:
     def start(self) -> None:
         """Resume what an earlier process left on the bench, and start the schedule.
 
-        A signal to end is handled here first: an HTTP server waits for its requests before it closes the service, and
+        A signal to end is obeyed here at once: an HTTP server waits for its requests before it closes the service, and
         a client may follow a campaign for hours.
         """
         self._hooks.enter_context(shutdown_hook(self.end_soon))

@@ -5,6 +5,7 @@ Only a process's main thread gets signals; in another thread none of these scope
 
 from __future__ import annotations
 
+import os
 import signal
 import threading
 from collections.abc import Callable, Iterator, Mapping
@@ -61,21 +62,44 @@ def is_main_thread() -> bool:
 
 @contextmanager
 def shutdown_hook(hook: Callable[[], None]) -> Iterator[None]:
-    """Call `hook` at each ending signal, before the handler found; it may neither block nor raise.
+    """Call `hook` once, in a thread of its own, at the first ending signal; the handler found has every signal.
 
-    A signal that is ignored, or ends the process without a Python handler, does not call it.
+    A handler runs in the middle of what the main thread does. Were the hook called there, it would wait for ever for a
+    lock that this thread holds, be it that of its own first call, which a second signal interrupts. So the handler only
+    writes a byte. The block ends when a hook that was begun has ended; a signal that is ignored, or ends the process
+    without a Python handler, begins none.
     """
+    if not is_main_thread():
+        yield
+        return
+    reader, writer = os.pipe2(os.O_CLOEXEC)
+    heard = False
+
+    def await_signal() -> None:
+        if os.read(reader, 1):
+            hook()
 
     def before_the(handler: Callable[[int, FrameType | None], object]) -> Handler:
         def handle(number: int, frame: FrameType | None) -> None:
-            hook()
+            nonlocal heard
+            if not heard:
+                heard = True
+                os.write(writer, b"!")
             handler(number, frame)
 
         return handle
 
+    waiting = threading.Thread(target=await_signal, name="shutdown-hook", daemon=True)
+    waiting.start()
     handlers = {number: signal.getsignal(number) for number in ENDING}
-    with signal_handlers({number: before_the(handler) for number, handler in handlers.items() if callable(handler)}):
-        yield
+    try:
+        with signal_handlers({number: before_the(each) for number, each in handlers.items() if callable(each)}):
+            yield
+    finally:
+        heard = True  # a handler that was kept elsewhere writes nothing into a closed pipe
+        os.close(writer)
+        waiting.join()
+        os.close(reader)
 
 
 @contextmanager

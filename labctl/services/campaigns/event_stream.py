@@ -93,7 +93,8 @@ class CampaignEventStream:
         self, campaign: int, after: int, over: Callable[[], bool]
     ) -> AsyncIterator[EventResponse | CampaignResponse | None]:
         """Yield a campaign's events after number `after`, where it stands whenever that has changed, and None to show
-        that the stream lives, until the campaign has ended and its drafts are made, or it is `over` for another reason.
+        that the stream lives, until the campaign has ended and its drafts are made, or it is `over` for another reason,
+        which is asked in a thread: it may wait for another process.
 
         A client that reads slowly gets the newest status next, never a queue of old ones; the bench only rings a bell,
         at most every MIN_S.
@@ -104,7 +105,7 @@ class CampaignEventStream:
         try:
             while True:
                 bell.clear()
-                state, awaited, updates = await self._updates(campaign, after)
+                ends, updates = await self._updates(campaign, after, over)
                 for event in updates:
                     after = event.id
                     yield event
@@ -112,7 +113,7 @@ class CampaignEventStream:
                 if now != last_sent:
                     last_sent = now
                     yield now
-                if (state in ENDED and not awaited) or over():
+                if ends:
                     return
                 async for live in self._meanwhile(campaign, bell):
                     if live is None or live != last_sent:
@@ -122,19 +123,22 @@ class CampaignEventStream:
             if stop is not None:
                 stop()
 
-    async def _updates(self, campaign: int, after: int) -> tuple[CampaignState, bool, list[EventResponse]]:
-        """Return the state in the database, not that of the live picture, whether a campaign that is done still awaits
-        a draft, and the events that came before.
+    async def _updates(self, campaign: int, after: int, over: Callable[[], bool]) -> tuple[bool, list[EventResponse]]:
+        """Return whether the stream ends, by the state in the database, not that of the live picture, and the events
+        that came before. A campaign that is done and still awaits a draft goes on.
 
         The last event is written before the state there ends, so that a client that sees the end has seen every event.
         """
 
-        def look() -> tuple[CampaignState, bool, list[EventResponse]]:
-            state = self._store.campaigns.state(campaign)
-            awaited = state is CampaignState.DONE and self._store.drafts.is_awaited(campaign)
-            return state, awaited, [event_answer(row) for row in self._store.campaigns.events(campaign, after)]
+        def look() -> tuple[bool, list[EventResponse]]:
+            ends = over() or self._has_ended(campaign)
+            return ends, [event_answer(row) for row in self._store.campaigns.events(campaign, after)]
 
         return await self._status_cache.at(("updates", campaign, after), look)
+
+    def _has_ended(self, campaign: int) -> bool:
+        state = self._store.campaigns.state(campaign)
+        return state in ENDED and not (state is CampaignState.DONE and self._store.drafts.is_awaited(campaign))
 
     async def _now(self, campaign: int) -> CampaignResponse:
         return await self._status_cache.at(("now", campaign), lambda: self._status(campaign))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager
@@ -10,6 +11,7 @@ from contextlib import AbstractContextManager
 import pytest
 
 from procedures.execution.signals import ENDING, defer_signals, ignore_signals, shutdown_hook, signal_handlers
+from tests.helpers.patience import WAIT_S
 
 Scope = Callable[[], AbstractContextManager[None]]
 
@@ -60,11 +62,31 @@ def test_a_handler_that_was_replaced_meanwhile_is_left_alone(heard: list[int]) -
     assert heard == []
 
 
-def test_a_shutdown_hook_is_called_before_the_handler_that_was_there(heard: list[int]) -> None:
-    with shutdown_hook(lambda: heard.append(-1)):
+def test_a_shutdown_hook_is_called_once_and_the_handler_that_was_there_for_every_signal(heard: list[int]) -> None:
+    called: list[str] = []
+    with shutdown_hook(lambda: called.append(threading.current_thread().name)):
         signal.raise_signal(signal.SIGTERM)
+        signal.raise_signal(signal.SIGHUP)
     signal.raise_signal(signal.SIGTERM)
-    assert heard == [-1, signal.SIGTERM, signal.SIGTERM]
+    assert called == ["shutdown-hook"]
+    assert heard == [signal.SIGTERM, signal.SIGHUP, signal.SIGTERM]
+
+
+def test_a_shutdown_hook_may_take_a_lock_that_the_main_thread_holds_when_the_signal_comes(heard: list[int]) -> None:
+    lock, taken = threading.Lock(), list[bool]()
+    with shutdown_hook(lambda: taken.append(lock.acquire(timeout=WAIT_S))), lock:
+        signal.raise_signal(signal.SIGTERM)
+        signal.raise_signal(signal.SIGTERM)
+    assert (taken, heard) == ([True], [signal.SIGTERM, signal.SIGTERM])
+
+
+def test_without_a_signal_a_shutdown_hook_is_not_called_also_not_by_a_handler_that_was_kept(heard: list[int]) -> None:
+    called: list[int] = []
+    with shutdown_hook(lambda: called.append(1)):
+        kept = signal.getsignal(signal.SIGTERM)
+    assert callable(kept)
+    kept(signal.SIGTERM, None)
+    assert (called, heard) == ([], [signal.SIGTERM])
 
 
 def test_an_ignored_signal_is_noted_and_a_deferred_one_comes_once_after_the_block(heard: list[int]) -> None:

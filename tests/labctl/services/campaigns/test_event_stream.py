@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import threading
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
@@ -127,3 +128,22 @@ def test_changes_that_follow_each_other_quickly_are_one_to_a_client(
         return len(calls), heard, late
 
     assert in_a_loop(rung()) == (2, True, True)
+
+
+def test_whether_the_service_ends_is_asked_beside_the_loop_which_may_not_wait_for_another_process(
+    in_a_loop: Loop,
+) -> None:
+    asked: list[bool] = []
+    campaigns = SimpleNamespace(state=lambda _: "running", events=lambda *_: [])
+    store: Any = SimpleNamespace(campaigns=campaigns)
+
+    def over() -> bool:
+        asked.append(threading.current_thread() is threading.main_thread())
+        return True
+
+    async def followed() -> list[Any]:
+        stream = CampaignEventStream(store, lambda campaign: campaign, None)  # type: ignore[arg-type,return-value]
+        return [update async for update in stream.follow(7, 0, over)]
+
+    assert in_a_loop(followed()) == [7]
+    assert asked == [False]
