@@ -64,7 +64,7 @@ def is_main_thread() -> bool:
 def shutdown_hook(hook: Callable[[], None]) -> Iterator[None]:
     """Call `hook` once, in a thread of its own, at the first ending signal; the handler found has every signal.
 
-    A handler runs in the middle of what the main thread does. Were the hook called there, it would wait for ever for a
+    A handler runs in the middle of what the main thread does. Were the hook called there, it would never get a
     lock that this thread holds, be it that of its own first call, which a second signal interrupts. So the handler only
     writes a byte. The block ends when a hook that was begun has ended; a signal that is ignored, or ends the process
     without a Python handler, begins none.
