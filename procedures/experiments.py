@@ -33,6 +33,7 @@ class Block:
     text: str  #: what is done, in words, to go on with after "Next: "
     change: Callable[[Recipe], Changes]
     needs: tuple[str, ...] = ()  #: what a bench needs besides table and chamber, in words
+    tests_laws: bool = False  #: whether it is for a law without a name alone, and distinguishes no effects
 
     def changed(self, recipe: Recipe) -> Recipe | None:
         """Return the recipe of the experiment; None where this recipe does not lend itself to it.
@@ -77,8 +78,10 @@ NEAR_REST = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2)
 CYCLE_DEG, LONGEST_S = 1.8, 600.0
 #: What a tilted fixture brings up in an experiment: all three axes turn at 1/sqrt(3) of the table's rate.
 DIAGONAL = "x+y+z"
-#: Fewer rates than these have no shape between which others would lie.
-MIN_RATES = 5
+#: Fewer rates, or temperatures, than these have no shape between which others would lie.
+MIN_RATES, MIN_TEMPERATURES = 5, 5
+#: A data set lasts at most so many times as long, to be of whole turns of the table, else of whole cycles of its motor.
+LONGER_FOR = ((360.0, 1.5), (CYCLE_DEG, 2.0))
 #: Shares of the largest rate that are close to each other in its top third.
 TOP = (0.3, 0.5, *np.arange(0.66, 1.001, 0.04).tolist())
 
@@ -304,8 +307,43 @@ def _between(recipe: Recipe) -> Changes:
     rates = sorted({*recipe.rates_dps})
     if len(rates) < MIN_RATES:
         return None
-    halfway = [float(f"{(low + high) / 2:.6g}") for low, high in pairwise(rates)]
-    return {"temperatures_c": spread_c(recipe, SEVERAL_C), "rates_dps": halfway, **_short(recipe)}
+    halfway = _halfway(rates)
+    acquire = over_whole_turns(recipe, halfway)
+    return {"temperatures_c": spread_c(recipe, SEVERAL_C), "rates_dps": halfway, "acquire": acquire, **_short(recipe)}
+
+
+def _between_temperatures(recipe: Recipe) -> Changes:
+    """Temperatures half-way between those of the recipe: what the error does there was not measured."""
+    temperatures_c = sorted({*recipe.temperatures_c})
+    if len(temperatures_c) < MIN_TEMPERATURES or not _turns(recipe):
+        return None
+    rates = few_rates(recipe)
+    return {
+        "temperatures_c": _halfway(temperatures_c), "rates_dps": rates, "acquire": over_whole_turns(recipe, rates),
+        **_short(recipe),
+    }  # fmt: skip
+
+
+def _halfway(rising: list[float]) -> list[float]:
+    return [float(f"{(low + high) / 2:.6g}") for low, high in pairwise(rising)]
+
+
+def over_whole_turns(recipe: Recipe, rates_dps: Iterable[float]) -> dict[str, object]:
+    """Return how data sets are taken in which the table turns by a whole number of turns at every rate.
+
+    The angle of a stepper is wrong by A times a wave over each cycle of its motor, with A some 5 % of a step. Over
+    whole cycles that averages out; over a part of one it makes the mean rate of a data set of duration D wrong by up to
+    2 A / D, in every repetition alike, which no residual distinguishes from an error of the gyro at that rate. All
+    data sets last a whole number of seconds; where no such time is near, whole cycles have to do, and else the recipe's
+    own duration.
+    """
+    sizes, shortest_s = np.array([abs(rate) for rate in rates_dps if rate]), recipe.acquire.duration_s
+    for angle_deg, times in LONGER_FOR:
+        for whole_s in range(int(np.ceil(shortest_s)), int(times * shortest_s) + 1):
+            cycles = sizes * whole_s / angle_deg
+            if np.allclose(cycles, np.round(cycles), rtol=0, atol=1e-6):
+                return {**recipe.acquire.model_dump(), "duration_s": float(whole_s)}
+    return recipe.acquire.model_dump()
 
 
 def _near_rest(recipe: Recipe) -> Changes:
@@ -372,6 +410,10 @@ BLOCKS: tuple[Block, ...] = (
     Block("first_again", "the lowest temperature, the highest, and the lowest again, at a few rates", _first_again),
     Block("top_rates", "more rates in the top third, at one temperature", _top),
     Block("between_rates", "rates half-way between those of the recipe, at a few temperatures", _between),
+    Block(
+        "between_temperatures", "temperatures half-way between those of the recipe, at a few rates",
+        _between_temperatures, tests_laws=True,
+    ),
     Block("near_rest", "small rates of both signs, at one temperature", _near_rest),
     Block(
         "sine", "sines of the rate from 0.2 Hz up, as fast as the table follows, at one temperature", _sine,

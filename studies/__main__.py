@@ -30,6 +30,7 @@ STUDIES = (
     "diagnosis",
     "designed_campaigns",
     "laws",
+    "law_experiments",
     "rest_loops",
     "scale_loops",
     "rest_verdicts",

@@ -34,17 +34,17 @@ from numpy.typing import NDArray
 from instruments.bench_config import SimulationSettings
 from labctl.errors import LabctlError
 from labctl.fitting.criticism import Criticism, criticise, laws_of
-from labctl.fitting.data.fit_data import FitData, fit_data_of
+from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.data.joined import joined_recording
-from labctl.fitting.estimation.result import FitResult
-from labctl.fitting.models.error_model import ErrorModel, expand
 from labctl.fitting.models.presets import usual_model
 from labctl.recording import Recording
 from labctl.services.planning.loading import limits_of, load_bench, load_recipe
 from labctl.services.simulation.plan_simulation import hidden_recording
 from procedures.experiments import BLOCKS
 from procedures.planning.plan import make_plan
+from procedures.recipe.recipe import Recipe
 from studies.foreign_laws import SHAPES, kind_of_law
+from studies.law_witness import Witness, inside, without_absorbed
 from studies.report_tables import markdown, share
 
 Array = NDArray[np.float64]
@@ -61,10 +61,6 @@ MIN_VISIBLE = 0.03
 GOOD = 0.1
 #: What is left of the other recording is clearly worse from this ratio on.
 CLEARLY = 1.01
-#: The channels that a law may depend on: outside their ranges it is not compared with the truth.
-LIMITING = (
-    "table_rate_dps", "temperature_c", "chamber_c", "supply_v", "humidity_pct", "power_s", "t_s",
-)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -113,12 +109,17 @@ def recorded(schedule: str, seed: int, day: int) -> Recording:
     From day 2 on it is the experiment of the schedule.
     """
     chosen = SCHEDULES[schedule]
-    bench = load_bench(chosen.bench)
     recipe = load_recipe(chosen.recipe).model_copy(update=dict(chosen.other if day == 1 else chosen.changes))
     if day >= 2:
         changed = next(block for block in BLOCKS if block.id == chosen.then).changed(recipe)
         assert changed is not None
         recipe = changed
+    return recorded_by(recipe, chosen.bench, seed, day)
+
+
+def recorded_by(recipe: Recipe, bench_name: str, seed: int, day: int) -> Recording:
+    """Return what a recipe measures of a unit with nothing hidden, with the noise of a day."""
+    bench = load_bench(bench_name)
     gyro = bench.gyros[0].model_copy(update={"sample_rate_hz": READINGS_HZ})
     settings = (bench.simulation or SimulationSettings()).model_copy(update={"noise_seed": day})
     plan = make_plan(recipe, limits_of(bench))
@@ -169,72 +170,6 @@ class Outcome:
         return min(self.proposals, key=lambda one: max(one.own, one.other), default=None)
 
 
-def _without_absorbed(model: ErrorModel, data: FitData, axis: str) -> Callable[[Array], Array]:
-    """Return what takes the part that a model absorbs from values (m,) of an axis."""
-    columns = np.column_stack([column.values for _, column in model.columns(data.channels, axis)])
-    whole = expand(columns, model.temperature.basis(data.channels.temperature_c(axis)))
-    whole = whole / np.maximum(np.linalg.norm(whole, axis=0), 1e-300)
-    u, s, _ = np.linalg.svd(whole, full_matrices=False)
-    u = u[:, s > 1e-9 * s[0]]
-    return lambda values: np.asarray(values - u @ (u.T @ values))
-
-
-def _rms(parts: Iterable[Array]) -> float:
-    return float(np.sqrt(np.mean(np.concatenate(list(parts)) ** 2)))
-
-
-@dataclass(frozen=True)
-class Witness:
-    """The data sets of one recording with the hidden law in each, with which proposals are compared."""
-
-    data: FitData
-    hidden_dps: Mapping[str, Array]
-
-    @staticmethod
-    def of(added: FitData, plain: FitData, rows: NDArray[np.bool_] | None = None) -> Witness:
-        """Return some rows of a recording with a law and of the same one without it."""
-        hidden = {axis: added.outputs[axis] - plain.outputs[axis] for axis in added.outputs}
-        kept = np.ones(len(added), dtype=np.bool_) if rows is None else rows
-        return Witness(added.take(kept), {axis: values[kept] for axis, values in hidden.items()})
-
-    def error(self, base: ErrorModel, fit: FitResult) -> float:
-        """Return the error of what a fit models over the hidden law, both without what the base absorbs."""
-        wrong, whole = [], []
-        for axis, hidden in self.hidden_dps.items():
-            left = _without_absorbed(base, self.data, axis)
-            wrong.append(left(fit.fitted.error_dps(self.data.channels, axis) - hidden))
-            whole.append(left(hidden))
-        return _rms(wrong) / max(_rms(whole), 1e-300)
-
-    def known_form(self, base: ErrorModel) -> float:
-        """Return the error where the form of the hidden law is known, and its size is fitted to each axis."""
-        wrong, whole = [], []
-        for axis, hidden in self.hidden_dps.items():
-            left = _without_absorbed(base, self.data, axis)
-            column, seen = left(hidden), left(self.data.outputs[axis] - self.data.true_rate_dps(axis))
-            wrong.append(column * (1.0 - float(column @ seen) / max(float(column @ column), 1e-300)))
-            whole.append(column)
-        return _rms(wrong) / max(_rms(whole), 1e-300)
-
-    def left_dps(self, fit: FitResult) -> float:
-        """Return the root mean square of what a fit leaves, deg/s."""
-        channels = self.data.channels
-        return _rms(
-            self.data.outputs[axis] - self.data.true_rate_dps(axis) - fit.fitted.error_dps(channels, axis)
-            for axis in self.data.outputs
-        )
-
-
-def _inside(first: FitData, other: FitData) -> NDArray[np.bool_]:
-    """Return the data sets of another recording at which no channel is outside the range of the first, (m,)."""
-    rows = np.ones(len(other), dtype=np.bool_)
-    for name in LIMITING:
-        if name in first.channels and name in other.channels:
-            known, values = (np.asarray(data.channels[name], dtype=np.float64) for data in (first, other))
-            rows &= (values >= known.min()) & (values <= known.max())
-    return rows
-
-
 @lru_cache(maxsize=64)
 def unit_size(schedule: str, seed: int, law: str) -> tuple[float, float]:
     """Return z and the visible share of a law of unit size: over all data sets, in noise floors of their means."""
@@ -243,7 +178,7 @@ def unit_size(schedule: str, seed: int, law: str) -> tuple[float, float]:
     model, visible, whole = usual_model(data), 0.0, 0.0
     for axis, noise in data.noise_floor.axes.items():
         hidden = added.outputs[axis] - data.outputs[axis]
-        visible += float(np.sum((_without_absorbed(model, data, axis)(hidden) / noise.floor_dps) ** 2))
+        visible += float(np.sum((without_absorbed(model, data, axis)(hidden) / noise.floor_dps) ** 2))
         whole += float(np.sum((hidden / noise.floor_dps) ** 2))
     return float(np.sqrt(visible)), float(np.sqrt(visible / whole))
 
@@ -254,7 +189,11 @@ def _fastest_dps(recording: Recording) -> float:
 
 def with_law(case: Case, day: int) -> Recording:
     """Return a recording of a case's unit with its law: the size belongs to z on the recording that is criticised."""
-    plain = recorded(case.schedule, case.seed, day)
+    return with_law_in(recorded(case.schedule, case.seed, day), case)
+
+
+def with_law_in(plain: Recording, case: Case) -> Recording:
+    """Return any recording of a case's unit with its law."""
     if not case.law:
         return plain
     size_dps = case.z / unit_size(case.schedule, case.seed, case.law)[0]
@@ -274,17 +213,18 @@ def outcome(case: Case) -> Outcome | None:
     recording = criticised(case)
     try:
         found = criticise(recording, usual_model(fit_data_of(recording)))
-        return _scored(case, found)
+        return scored(case, found, criticised(replace(case, law="")))
     except LabctlError as error:
         return Outcome(case, "failed", failed=str(error))
 
 
-def _scored(case: Case, found: Criticism) -> Outcome:
+def scored(case: Case, found: Criticism, plain: Recording) -> Outcome:
+    """Return what a criticism says of a case; `plain` is what was criticised, without the law."""
     verdict, base = found.verdict, found.base
     assert base is not None
     first, second = found.fit_data, fit_data_of(with_law(case, 1))
-    own = Witness.of(first, fit_data_of(criticised(replace(case, law=""))))
-    other = Witness.of(second, fit_data_of(recorded(case.schedule, case.seed, 1)), _inside(first, second))
+    own = Witness.of(first, fit_data_of(plain))
+    other = Witness.of(second, fit_data_of(recorded(case.schedule, case.seed, 1)), inside(first, second))
     model, left_dps = base.fitted.model, other.left_dps(base)
     proposals = tuple(
         Proposal(

@@ -43,4 +43,5 @@ class LawTest(TypedDict):
     do: str
     """What to measure, in words."""
     toml: str
-    """Recipe that measures half-way between the rates of the recordings, TOML; empty where the bench has none."""
+    """Recipe that measures half-way between the rates of the recordings, or between their temperatures where the
+    likeliest law bends over these, TOML; empty where the bench has none."""

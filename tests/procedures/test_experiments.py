@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from instruments import plugins
 from instruments.eccentricity import Eccentricity
 from instruments.interfaces.supply import SupplyLimits
 from instruments.plugins import PluginError, PluginGroup
+from instruments.simulators.physics.motion import TableMotion
 from labctl.services.criticism.next_experiment import plans_of
 from labctl.services.planning.loading import limits_of, load_bench, load_recipe
 from procedures import experiments
 from procedures.contracts.errors import PlanRefused
 from procedures.contracts.steps import Acquire, MoveChamber
-from procedures.experiments import BLOCKS, NOT_TAKEN, Block, _checked, all_blocks
+from procedures.experiments import BLOCKS, NOT_TAKEN, Block, _checked, all_blocks, over_whole_turns
 from procedures.planning.limits import BenchLimits
 from procedures.planning.plan import make_plan
 from procedures.recipe.recipe import Recipe, parse_recipe, recipe_document
@@ -111,6 +114,50 @@ def test_near_rest_a_stepper_turns_by_whole_cycles_of_its_motor() -> None:
         assert min(cycles) >= 1.0
         assert changed.acquire.duration_s <= 600.0
         assert max(changed.rates_dps) == pytest.approx(max(whole.rates_dps), rel=1e-3)
+
+
+def test_between_the_rates_a_table_turns_by_whole_turns_and_its_mean_rate_is_the_commanded_one() -> None:
+    """Over a part of a cycle of its motor the angle of a stepper is wrong by more than a good gyro's noise."""
+    whole = load_recipe("ojeda2000-121")
+    changed = next(block for block in BLOCKS if block.id == "between_rates").changed(whole)
+    assert changed is not None
+    wrong_dps: dict[float, list[float]] = {}
+    for duration_s in (whole.acquire.duration_s, changed.acquire.duration_s):
+        for rate in changed.rates_dps:
+            motion, step_hz = TableMotion(1600), abs(rate) / 0.225
+            motion.start(0.0, int(np.sign(rate)) * 200_000, step_hz, 90.0)
+            begin, end = motion.angle_deg(np.array([10.0, 10.0 + duration_s]))
+            wrong_dps.setdefault(duration_s, []).append(abs((end - begin) / duration_s - rate))
+    assert list(wrong_dps) == [30.0, 36.0]
+    assert max(wrong_dps[30.0]) > 5e-4
+    assert max(wrong_dps[36.0]) < 1e-9
+
+
+@pytest.mark.parametrize(("duration_s", "rates_dps", "expected_s"), [
+    (30.0, (0.0, 10.0, -50.0), 36.0),  # whole turns
+    (10.0, (40.0, 100.0, 280.0), 18.0),  # whole turns would last more than half as long again: whole cycles
+    (30.0, (0.07, 33.3), 30.0),  # nothing near fits
+    (30.5, (0.0,), 31.0),
+])  # fmt: skip
+def test_data_sets_are_lengthened_to_whole_turns_then_to_whole_cycles_and_else_left(
+    duration_s: float, rates_dps: tuple[float, ...], expected_s: float
+) -> None:
+    recipe = load_recipe("ojeda2000-121")
+    acquire = recipe.acquire.model_copy(update={"duration_s": duration_s})
+    lengthened = over_whole_turns(recipe.model_copy(update={"acquire": acquire}), rates_dps)
+    assert lengthened == {**acquire.model_dump(), "duration_s": expected_s}
+
+
+def test_between_the_temperatures_a_few_rates_are_measured_and_no_effects_are_distinguished_by_that() -> None:
+    block = next(block for block in BLOCKS if block.id == "between_temperatures")
+    whole = load_recipe("ojeda2000-121")
+    changed = block.changed(whole)
+    assert changed is not None
+    rising = sorted(whole.temperatures_c)
+    assert changed.temperatures_c == pytest.approx([(low + high) / 2 for low, high in pairwise(rising)])
+    assert changed.rates_dps == pytest.approx([-100.0, -60.0, 0.0, 60.0, 100.0])
+    assert block.changed(whole.model_copy(update={"temperatures_c": (20.0, 25.0, 30.0, 35.0)})) is None
+    assert block.id not in {each.block.id for each in plans_of(whole, load_bench("single-axis-sim"))}
 
 
 def test_sines_are_swept_where_the_recipe_and_the_table_change_the_rate() -> None:

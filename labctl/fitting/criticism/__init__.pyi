@@ -31,6 +31,7 @@ from labctl.fitting.criticism.laws.proposals import (
     coefficients_of_law as coefficients_of_law,
     laws_of as laws_of,
 )
+from labctl.fitting.criticism.laws.bends_over import bends_over as bends_over
 from labctl.fitting.criticism.planned_addition import schedule_with_planned as schedule_with_planned
 from labctl.fitting.criticism.reduction import (
     ReducedRecording as ReducedRecording,

@@ -6,6 +6,7 @@ A module of its own, because a kept answer needs none of it, and these libraries
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 from labctl.answers.criticism import CriticismResponse, Experiment
 from labctl.answers.laws import LawTest, ProposedLaw
@@ -104,10 +105,7 @@ def _proposals(
 ) -> tuple[list[Experiment], list[ProposedLaw], LawTest | None]:
     """Return what to measure next, laws for what has no name, and the measurement that tells these apart."""
     experiments = _experiments(store, rows, criticism)
-    laws, law_test = proposed_laws(criticism)
-    if law_test is not None:
-        law_test["toml"] = _recipe_for_laws(store, rows, criticism)
-    return experiments, laws, law_test
+    return experiments, *proposed_laws(criticism, partial(_recipe_for_laws, store, rows, criticism))
 
 
 def _experiments(store: Store, rows: tuple[RecordingRow, ...], criticism: Criticism) -> list[Experiment]:
@@ -119,10 +117,10 @@ def _experiments(store: Store, rows: tuple[RecordingRow, ...], criticism: Critic
     return experiments_for(store, rows, criticism)
 
 
-def _recipe_for_laws(store: Store, rows: tuple[RecordingRow, ...], criticism: Criticism) -> str:
+def _recipe_for_laws(store: Store, rows: tuple[RecordingRow, ...], criticism: Criticism, channel: str) -> str:
     from labctl.services.criticism.next_experiment import recipe_for_laws  # noqa: PLC0415  it loads the drivers
 
-    return recipe_for_laws(store, rows, criticism)
+    return recipe_for_laws(store, rows, criticism, channel)
 
 
 def _applied(store: Store, calibration: CalibrationRecord, measured: Measurements) -> VerificationResponse | None:

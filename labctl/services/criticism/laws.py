@@ -2,20 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from labctl.answers.laws import LawTest, ProposedLaw
-from labctl.fitting.criticism import Breaking, Criticism, Law, breaking, coefficients_of_law, consequences, laws_of
+from labctl.fitting.criticism import (
+    Breaking,
+    Criticism,
+    Law,
+    bends_over,
+    breaking,
+    coefficients_of_law,
+    consequences,
+    laws_of,
+)
 from labctl.progress import report_stage
 
 
-def proposed_laws(criticism: Criticism) -> tuple[list[ProposedLaw], LawTest | None]:
-    """Return laws for what has no name, and where the two likeliest differ most; none beside a name."""
+def proposed_laws(criticism: Criticism, recipe_for: Callable[[str], str]) -> tuple[list[ProposedLaw], LawTest | None]:
+    """Return laws for what has no name, and where the two likeliest differ most; none beside a name.
+
+    `recipe_for` makes the recipe, TOML, of the test: between the levels of the channel over which the likeliest bends.
+    """
     if criticism.verdict.form != "unexplained":
         return [], None
     report_stage("searching a law")
     laws = laws_of(criticism)
-    return [_law(law, criticism) for law in laws], _test(breaking(laws, criticism), criticism)
+    test = _test(breaking(laws, criticism), criticism)
+    if test is not None:
+        test["toml"] = recipe_for(bends_over(laws[0], criticism))
+    return [_law(law, criticism) for law in laws], test
 
 
 def _law(law: Law, criticism: Criticism) -> ProposedLaw:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,8 +41,8 @@ MIN_OPEN_BIT = 0.01
 #: An experiment is also planned with its rates run so many times as often, while it is shorter than this, h: the soaks
 #: and mountings are the same, a weak effect needs the readings, and drift needs the time.
 LONGER, LONGEST_TO_REPEAT_H = (4, 16), 6.0
-#: The block that tests laws: where between the rates they differ.
-BETWEEN = "between_rates"
+#: The blocks that test a law, by the channel over which it bends most: between the levels that were measured.
+BETWEEN = {"table_rate_dps": "between_rates", "temperature_c": "between_temperatures"}
 #: Effects named in the sentence that explains a choice; the rest is counted.
 NAMED = 3
 #: Why probabilities can be known while a verdict names no cause alone.
@@ -120,19 +120,28 @@ def experiments_for(store: Store, rows: Sequence[RecordingRow], criticism: Criti
     return [_described(each, question, recipe, len(foreseen)) for each in foreseen[:SHOWN]]
 
 
-def recipe_for_laws(store: Store, rows: Sequence[RecordingRow], criticism: Criticism) -> str:
-    """Return a recipe, TOML, that measures half-way between the rates of recordings; empty where there is none.
+def recipe_for_laws(store: Store, rows: Sequence[RecordingRow], criticism: Criticism, channel: str) -> str:
+    """Return a recipe, TOML, that measures half-way between the levels of a channel; empty where there is none.
 
-    Laws that agree at the rates of the recordings differ there. `rows` are the recordings that were criticised.
+    Laws that agree at the rates, or the temperatures, of the recordings differ between them. `rows` are the recordings
+    that were criticised. What was measured already is asked for more often.
     """
     base = _recipe_of(store, rows, criticism) if criticism.data.info.motion == "rates" else None
     if base is None:
         return ""
     recipe, bench, done = base
-    for each in plans_of(recipe, bench):
-        if each.block.id == BETWEEN and _what(each.plan.recipe) not in map(_what, done):
-            return tomli_w.dumps(recipe_document(each.plan.recipe) | {"name": f"{recipe.name}-next"})
-    return ""
+    planned = next(law_tests(recipe, bench, channel, done), None)
+    return (
+        "" if planned is None else tomli_w.dumps(recipe_document(planned.plan.recipe) | {"name": f"{recipe.name}-next"})
+    )
+
+
+def law_tests(recipe: Recipe, bench: BenchFile, channel: str, done: Sequence[Recipe] = ()) -> Iterator[Planned]:
+    """Yield the experiments between the levels of a channel that were not `done`, the shortest first."""
+    known = [_what(each) for each in done]
+    for planned in plans_of(recipe, bench, lambda block: block.id == BETWEEN[channel]):
+        if _what(planned.plan.recipe) not in known:
+            yield planned
 
 
 def ranked_experiments(
@@ -172,14 +181,18 @@ def _what(recipe: Recipe) -> dict[str, object]:
     return recipe.model_dump(exclude={"name", "description", "seed", "fit", "stop"})
 
 
-def plans_of(recipe: Recipe, bench: BenchFile) -> Iterator[Planned]:
+def plans_of(
+    recipe: Recipe, bench: BenchFile, asked: Callable[[Block], bool] = lambda block: not block.tests_laws
+) -> Iterator[Planned]:
     """Yield every installed experiment that can be made of a recipe and run on a bench, short ones also longer.
+
+    Only those that are `asked` for; as it is, all that distinguish effects.
 
     One that makes no recipe, or is beyond the limits of the bench, is left out; the log has its reason.
     An experiment looks for an effect, so it does not end where U of a model without that effect is small enough.
     """
     limits, recipe = limits_of(bench, driven=True), recipe.model_copy(update={"stop": None})
-    for block in all_blocks():
+    for block in filter(asked, all_blocks()):
         try:
             changed = block.changed(recipe)
             if changed is None:

@@ -65,7 +65,7 @@ def _row_at_end(rising: Array, added: Array) -> int:
     return int(at_end[np.argmax(np.abs(added[at_end]))])
 
 
-def _of(law: Law, channels: Channels, axis: str) -> Array:
+def law_dps(law: Law, channels: Channels, axis: str) -> Array:
     """Return the values of a law alone, (n,) deg/s, by the coefficients of its fit."""
     model, of_axis = law.fit.fitted.model, law.fit.fitted.axes[axis]
     total = np.zeros(len(channels))
@@ -82,8 +82,8 @@ def _has_rate(law: Law) -> bool:
 
 
 def _symmetry(law: Law, channels: Channels, axis: str) -> str:
-    there, back = (_of(law, at_rates(channels, axis, share), axis) for share in (1.0, -1.0))
-    at_rest = _of(law, at_rates(channels, axis, 0.0), axis)
+    there, back = (law_dps(law, at_rates(channels, axis, share), axis) for share in (1.0, -1.0))
+    at_rest = law_dps(law, at_rates(channels, axis, 0.0), axis)
     size = max(float(np.abs(there).max()), 1e-300)
     rest = float(np.abs(at_rest).max())
     if float(np.abs(there + back).max()) < SYMMETRIC * size:

@@ -18,7 +18,9 @@ from labctl.fitting.models.presets import preset_for
 from labctl.services.calibrations.fitting import fit_unit
 from labctl.services.calibrations.revision import improve_unit
 from labctl.services.criticism.criticise import criticise_unit, write_next
-from labctl.services.criticism.next_experiment import recipe_for_laws
+from labctl.services.criticism.laws import proposed_laws
+from labctl.services.criticism.next_experiment import law_tests, recipe_for_laws
+from labctl.services.planning.loading import load_bench, load_recipe
 from labctl.store import Store, open_store
 from procedures.recipe.recipe import parse_recipe
 from tests.helpers.diagnoses import criticism
@@ -57,7 +59,8 @@ def test_an_unexplained_residual_has_a_law_that_the_model_can_take(store: Store)
 def test_the_recipe_that_tests_laws_measures_half_way_between_the_rates(store: Store, tmp_path: Path) -> None:
     recording = single_axis(3)
     model, _ = preset_for("ojeda2000", []).build(fit_data_of(recording))
-    toml = recipe_for_laws(store, store.recordings.of_unit("FOG-0001"), criticise(recording, model, full=False))
+    criticised = criticise(recording, model, full=False)
+    toml = recipe_for_laws(store, store.recordings.of_unit("FOG-0001"), criticised, "table_rate_dps")
     rates = np.unique(np.round(np.asarray(recording.columns["table_rate_dps"], dtype=np.float64), 1)).tolist()
     halfway = [(low + high) / 2 for low, high in pairwise(rates)]
     assert sorted(parse_recipe(toml).rates_dps) == pytest.approx(halfway, abs=0.05)
@@ -67,3 +70,28 @@ def test_the_recipe_that_tests_laws_measures_half_way_between_the_rates(store: S
     assert (tmp_path / "next.toml").read_text(encoding="utf-8") == toml
     with pytest.raises(BadInput, match="no recipe was written"):
         write_next(unexplained, tmp_path / "none.toml")
+
+
+@pytest.mark.parametrize(("channel", "block"), [
+    ("table_rate_dps", "between_rates"), ("temperature_c", "between_temperatures"),
+])  # fmt: skip
+def test_a_law_is_tested_between_the_levels_of_the_channel_over_which_it_bends_and_then_with_more_readings(
+    channel: str, block: str
+) -> None:
+    recipe, bench = load_recipe("ojeda2000-121"), load_bench("single-axis-sim")
+    first, *longer = law_tests(recipe, bench, channel)
+    assert {each.block.id for each in (first, *longer)} == {block}
+    assert first.plan.recipe.repeats == 1
+    assert [each.plan.recipe.repeats for each in longer][:1] == [4]
+    assert [each.plan.recipe for each in law_tests(recipe, bench, channel, [first.plan.recipe])] == [
+        each.plan.recipe for each in longer
+    ]
+
+
+def test_where_no_law_is_proposed_no_recipe_is_made() -> None:
+    recording = single_axis(3)
+    model, _ = preset_for("ojeda2000", []).build(fit_data_of(recording))
+    asked: list[str] = []
+    found = criticise(recording, model, full=False)
+    assert proposed_laws(found, lambda channel: asked.append(channel) or "") == ([], None)
+    assert asked == []

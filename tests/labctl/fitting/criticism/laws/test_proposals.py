@@ -7,7 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from labctl.fitting.criticism import Criticism, Law, breaking, coefficients_of_law, consequences, criticise, laws_of
+from labctl.fitting.criticism import (
+    Criticism,
+    Law,
+    bends_over,
+    breaking,
+    coefficients_of_law,
+    consequences,
+    criticise,
+    laws_of,
+)  # fmt: skip
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.effects import Term
 from labctl.fitting.effects.formula import read_formula
@@ -75,6 +84,22 @@ def test_two_laws_are_told_apart_where_they_differ_most(found: Criticism, laws: 
     assert place is not None
     assert place.difference_dps > SIZE_DPS / 2
     assert abs(place.rate_dps) <= 125.0
+
+
+@pytest.mark.parametrize(("formula", "channel"), [
+    ("sin(rate_dps/9)", "table_rate_dps"),
+    ("((temperature_c - 36)/10) * sin(rate_dps/9)", "table_rate_dps"),
+    ("(rate_dps/100) * sin(temperature_c/2)", "temperature_c"),
+    ("sin(temperature_c/2)", "temperature_c"),
+    ("sign(rate_dps) * abs(rate_dps/100)**0.5 * exp((temperature_c - 36)/40)", "table_rate_dps"),
+])  # fmt: skip
+def test_a_law_is_tested_along_the_channel_over_which_it_bends_most(formula: str, channel: str) -> None:
+    recording, term = single_axis(3), Term("law_1", formula=formula)
+    model = usual_model(fit_data_of(to_points(recording)))
+    found = criticise(recording, model, full=False)
+    fit = fit_preset(found.fit_data, changed(model, (term,)))
+    law = Law((term,), ("a law",), 0.0, 1.0, fit, {})
+    assert bends_over(law, found) == channel
 
 
 def test_nothing_is_proposed_for_noise() -> None:
