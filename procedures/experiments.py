@@ -14,6 +14,7 @@ import numpy as np
 from instruments.plugins import PluginGroup
 from instruments.positions import AXES, Position
 from procedures.recipe.recipe import Recipe, validated_recipe
+from procedures.recipe.whole_turns import CYCLE_DEG, over_whole_turns
 
 #: Changes of a recipe, by key; None where the recipe does not lend itself to the experiment.
 Changes = Mapping[str, object] | None
@@ -74,14 +75,12 @@ SLOW_C_PER_MIN, MIN_RAMP_K = 0.25, 5.0
 SWEEPS_HZ, SWEEP_S = ((0.2, 1.0), (1.0, 5.0), (5.0, 20.0)), 30.0
 #: Rates near rest, over the largest.
 NEAR_REST = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2)
-#: A stepper turns by this in a cycle of its motor, deg, and a data set near rest takes at most so long, s.
-CYCLE_DEG, LONGEST_S = 1.8, 600.0
+#: A data set near rest takes at most so long, s.
+LONGEST_S = 600.0
 #: What a tilted fixture brings up in an experiment: all three axes turn at 1/sqrt(3) of the table's rate.
 DIAGONAL = "x+y+z"
 #: Fewer rates, or temperatures, than these have no shape between which others would lie.
 MIN_RATES, MIN_TEMPERATURES = 5, 5
-#: A data set lasts at most so many times as long, to be of whole turns of the table, else of whole cycles of its motor.
-LONGER_FOR = ((360.0, 1.5), (CYCLE_DEG, 2.0))
 #: Shares of the largest rate that are close to each other in its top third.
 TOP = (0.3, 0.5, *np.arange(0.66, 1.001, 0.04).tolist())
 
@@ -307,8 +306,7 @@ def _between(recipe: Recipe) -> Changes:
     rates = sorted({*recipe.rates_dps})
     if len(rates) < MIN_RATES:
         return None
-    halfway = _halfway(rates)
-    acquire = over_whole_turns(recipe, halfway)
+    acquire = over_whole_turns(recipe, halfway := _halfway(rates))
     return {"temperatures_c": spread_c(recipe, SEVERAL_C), "rates_dps": halfway, "acquire": acquire, **_short(recipe)}
 
 
@@ -318,32 +316,12 @@ def _between_temperatures(recipe: Recipe) -> Changes:
     if len(temperatures_c) < MIN_TEMPERATURES or not _turns(recipe):
         return None
     rates = few_rates(recipe)
-    return {
-        "temperatures_c": _halfway(temperatures_c), "rates_dps": rates, "acquire": over_whole_turns(recipe, rates),
-        **_short(recipe),
-    }  # fmt: skip
+    acquire = over_whole_turns(recipe, rates)
+    return {"temperatures_c": _halfway(temperatures_c), "rates_dps": rates, "acquire": acquire, **_short(recipe)}
 
 
 def _halfway(rising: list[float]) -> list[float]:
     return [float(f"{(low + high) / 2:.6g}") for low, high in pairwise(rising)]
-
-
-def over_whole_turns(recipe: Recipe, rates_dps: Iterable[float]) -> dict[str, object]:
-    """Return how data sets are taken in which the table turns by a whole number of turns at every rate.
-
-    The angle of a stepper is wrong by A times a wave over each cycle of its motor, with A some 5 % of a step. Over
-    whole cycles that averages out; over a part of one it makes the mean rate of a data set of duration D wrong by up to
-    2 A / D, in every repetition alike, which no residual distinguishes from an error of the gyro at that rate. All
-    data sets last a whole number of seconds; where no such time is near, whole cycles have to do, and else the recipe's
-    own duration.
-    """
-    sizes, shortest_s = np.array([abs(rate) for rate in rates_dps if rate]), recipe.acquire.duration_s
-    for angle_deg, times in LONGER_FOR:
-        for whole_s in range(int(np.ceil(shortest_s)), int(times * shortest_s) + 1):
-            cycles = sizes * whole_s / angle_deg
-            if np.allclose(cycles, np.round(cycles), rtol=0, atol=1e-6):
-                return {**recipe.acquire.model_dump(), "duration_s": float(whole_s)}
-    return recipe.acquire.model_dump()
 
 
 def _near_rest(recipe: Recipe) -> Changes:
@@ -411,8 +389,8 @@ BLOCKS: tuple[Block, ...] = (
     Block("top_rates", "more rates in the top third, at one temperature", _top),
     Block("between_rates", "rates half-way between those of the recipe, at a few temperatures", _between),
     Block(
-        "between_temperatures", "temperatures half-way between those of the recipe, at a few rates",
-        _between_temperatures, tests_laws=True,
+        "between_temperatures", "temperatures half-way between those of the recipe", _between_temperatures,
+        tests_laws=True,
     ),
     Block("near_rest", "small rates of both signs, at one temperature", _near_rest),
     Block(

@@ -348,7 +348,7 @@ class CriticismResponse(ResponseModel):
         "out of the fit better than the model, the likeliest first. A law is a description, and no cause.",
     )
     law_test: LawTest | None = Field(
-        default=None, description="Where the two likeliest laws differ most; null: fewer than two."
+        default=None, description="Where the two likeliest laws differ most, or one and the model; null: there is none."
     )
     hypothesis: Literal["temperature_not_logged"] | None = Field(
         default=None,

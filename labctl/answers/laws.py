@@ -32,7 +32,7 @@ class ProposedLaw(TypedDict):
 
 
 class LawTest(TypedDict):
-    """Where the two likeliest laws differ most: a measurement there refutes one of them."""
+    """Where the two likeliest laws differ most, or a single law and the model without it: what refutes one of them."""
 
     rate_dps: float
     """Rate, deg/s."""

@@ -20,7 +20,7 @@ from labctl.services.planning.loading import limits_of, load_bench, load_recipe
 from procedures import experiments
 from procedures.contracts.errors import PlanRefused
 from procedures.contracts.steps import Acquire, MoveChamber
-from procedures.experiments import BLOCKS, NOT_TAKEN, Block, _checked, all_blocks, over_whole_turns
+from procedures.experiments import BLOCKS, NOT_TAKEN, Block, _checked, all_blocks
 from procedures.planning.limits import BenchLimits
 from procedures.planning.plan import make_plan
 from procedures.recipe.recipe import Recipe, parse_recipe, recipe_document
@@ -131,21 +131,6 @@ def test_between_the_rates_a_table_turns_by_whole_turns_and_its_mean_rate_is_the
     assert list(wrong_dps) == [30.0, 36.0]
     assert max(wrong_dps[30.0]) > 5e-4
     assert max(wrong_dps[36.0]) < 1e-9
-
-
-@pytest.mark.parametrize(("duration_s", "rates_dps", "expected_s"), [
-    (30.0, (0.0, 10.0, -50.0), 36.0),  # whole turns
-    (10.0, (40.0, 100.0, 280.0), 18.0),  # whole turns would last more than half as long again: whole cycles
-    (30.0, (0.07, 33.3), 30.0),  # nothing near fits
-    (30.5, (0.0,), 31.0),
-])  # fmt: skip
-def test_data_sets_are_lengthened_to_whole_turns_then_to_whole_cycles_and_else_left(
-    duration_s: float, rates_dps: tuple[float, ...], expected_s: float
-) -> None:
-    recipe = load_recipe("ojeda2000-121")
-    acquire = recipe.acquire.model_copy(update={"duration_s": duration_s})
-    lengthened = over_whole_turns(recipe.model_copy(update={"acquire": acquire}), rates_dps)
-    assert lengthened == {**acquire.model_dump(), "duration_s": expected_s}
 
 
 def test_between_the_temperatures_a_few_rates_are_measured_and_no_effects_are_distinguished_by_that() -> None:

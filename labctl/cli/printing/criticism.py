@@ -112,7 +112,8 @@ def _print_laws(answer: CriticismResponse) -> None:
         text = f"{probability_text(law['probability'])}: {'; '.join(law['formulas'])}: {errors}"
         console.print(text, soft_wrap=not console.is_terminal)
     if answer.law_test is not None:
-        console.print(f"to distinguish the first two: {answer.law_test['do']}", soft_wrap=not console.is_terminal)
+        aim = "to distinguish the first two" if len(answer.laws) > 1 else "to test it"
+        console.print(f"{aim}: {answer.law_test['do']}", soft_wrap=not console.is_terminal)
     first = answer.laws[0]
     for sentence in first["follows"]:
         console.print(f"If it is the first: {sentence}", style="dim", soft_wrap=not console.is_terminal)

@@ -17,9 +17,12 @@ from labctl.fitting.criticism import (
 )
 from labctl.progress import report_stage
 
+#: The channels between whose levels a law is tested, in words.
+LEVELS = {"table_rate_dps": "rates", "temperature_c": "temperatures"}
+
 
 def proposed_laws(criticism: Criticism, recipe_for: Callable[[str], str]) -> tuple[list[ProposedLaw], LawTest | None]:
-    """Return laws for what has no name, and where the two likeliest differ most; none beside a name.
+    """Return laws for what has no name, and where to measure next to test them; none beside a name.
 
     `recipe_for` makes the recipe, TOML, of the test: between the levels of the channel over which the likeliest bends.
     """
@@ -29,7 +32,11 @@ def proposed_laws(criticism: Criticism, recipe_for: Callable[[str], str]) -> tup
     laws = laws_of(criticism)
     test = _test(breaking(laws, criticism), criticism)
     if test is not None:
-        test["toml"] = recipe_for(bends_over(laws[0], criticism))
+        channel = bends_over(laws[0], criticism)
+        if toml := recipe_for(channel):
+            levels = f"between the {LEVELS[channel]} of the recordings, over which the likeliest law bends most"
+            test["do"] += f"; the recipe of the test measures half-way {levels}"
+            test["toml"] = toml
     return [_law(law, criticism) for law in laws], test
 
 
@@ -65,10 +72,11 @@ def _test(place: Breaking | None, criticism: Criticism) -> LawTest | None:
         "" if place.temperature_c is None else f" and {place.temperature_c:.3g} deg C"
     )
     times = f", {place.difference_dps / floor_dps:.1f} times the noise floor" if floor_dps else ""
+    what = "the two likeliest laws differ" if place.laws == 2 else "the law and the model without it differ"
     return {
         "rate_dps": place.rate_dps,
         "temperature_c": place.temperature_c,
         "difference_dps": place.difference_dps,
-        "do": f"measure at {at}: there the two likeliest laws differ most, by {place.difference_dps:.3g} deg/s{times}",
+        "do": f"measure at {at}: there {what} most, by {place.difference_dps:.3g} deg/s{times}",
         "toml": "",
     }

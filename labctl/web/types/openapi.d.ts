@@ -6588,7 +6588,7 @@ export interface components {
              * @description Only for unexplained: at most five formulas that describe the residual and predict what is left out of the fit better than the model, the likeliest first. A law is a description, and no cause.
              */
             laws: components["schemas"]["ProposedLaw"][];
-            /** @description Where the two likeliest laws differ most; null: fewer than two. */
+            /** @description Where the two likeliest laws differ most, or one and the model; null: there is none. */
             law_test: components["schemas"]["LawTest"] | null;
             /**
              * Hypothesis
@@ -10668,7 +10668,7 @@ export interface components {
         };
         /**
          * LawTest
-         * @description Where the two likeliest laws differ most: a measurement there refutes one of them.
+         * @description Where the two likeliest laws differ most, or a single law and the model without it: what refutes one of them.
          */
         LawTest: {
             /**
@@ -10693,7 +10693,7 @@ export interface components {
             do: string;
             /**
              * Toml
-             * @description Recipe that measures half-way between the rates of the recordings, TOML; empty where the bench has none.
+             * @description Recipe that measures half-way between the rates of the recordings, or between their temperatures where the likeliest law bends over these, TOML; empty where the bench has none.
              */
             toml: string;
         };

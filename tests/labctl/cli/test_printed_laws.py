@@ -32,6 +32,13 @@ def test_laws_are_printed_with_their_errors_and_the_command_that_takes_the_first
     assert "labctl improve FOG-0001 --formula 'law_1: sin(9*rate_dps)' --formula 'law_2: abs(rate_dps)'" in lines[-1]
 
 
+def test_a_single_law_is_to_be_tested(capsys: pytest.CaptureFixture[str]) -> None:
+    test = {"rate_dps": 96.0, "temperature_c": None, "difference_dps": 0.002, "do": "measure at 96 deg/s", "toml": ""}
+    laws = [law(1.0, "law_1: sin(9*rate_dps)")]
+    print_criticism(criticism("unexplained").model_copy(update={"laws": laws, "law_test": test}))
+    assert "to test it: measure at 96 deg/s" in capsys.readouterr().out.splitlines()
+
+
 def test_a_sum_of_formulas_has_the_signs_of_its_coefficients() -> None:
     assert _sum([(0.02, "a"), (-0.03, "b"), (0.5, "c")]) == "0.02 * a - 0.03 * b + 0.5 * c"
     assert _sum([(-0.02, "a")]) == "-0.02 * a"

@@ -68,11 +68,15 @@ class Law:
 
 @dataclass(frozen=True)
 class Breaking:
-    """Where the errors of two laws differ most, which describe the data sets alike: a measurement there refutes one."""
+    """Where the errors of two laws differ most, which describe the data sets alike: a measurement there refutes one.
+
+    Of a single law, where it and the model without it differ most.
+    """
 
     rate_dps: float
     temperature_c: float | None
     difference_dps: float  #: between the two
+    laws: int  #: 2, or 1 where the other is the model without a law
 
 
 @single_threaded
@@ -116,27 +120,33 @@ def coefficients_of_law(law: Law) -> dict[str, dict[str, Coefficient]]:
 
 
 def breaking(laws: Sequence[Law], criticism: Criticism) -> Breaking | None:
-    """Return where the two likeliest laws differ most, with all else of their fits; None for fewer than two.
+    """Return where the two likeliest laws differ most, with all else of their fits; None without a law.
+
+    A single law is compared with the model without it.
 
     The rates are those of the data sets, of their axes alone, times a share of up to a quarter more, as far as the unit
     goes; the other channels are those of the data sets.
     """
-    if len(laws) < 2:
+    if not laws or criticism.base is None:
         return None
-    data, most = criticism.fit_data, Breaking(0.0, None, 0.0)
+    fits = (*(law.fit for law in laws[:2]), criticism.base)[:2]
+    data, most = criticism.fit_data, Breaking(0.0, None, 0.0, min(len(laws), 2))
     limit_dps = data.info.max_rate_dps or np.inf
     for axis in data.outputs:
         rate_dps = data.true_rate_dps(axis)
         for share in BETWEEN:
             channels = at_rates(data.channels, axis, share)
-            first, second = (where_finite(partial(law.fit.fitted.error_dps, channels, axis)) for law in laws[:2])
+            first, second = (where_finite(partial(fit.fitted.error_dps, channels, axis)) for fit in fits)
             if first is None or second is None:
                 continue
             apart = np.where(np.abs(share * rate_dps) <= limit_dps, np.abs(first - second), 0.0)
             row = int(np.argmax(apart))
             if float(apart[row]) > most.difference_dps:
                 temperature_c = float(data.temperature_c[row]) if data.channels.history.thermometer else None
-                most = Breaking(share * float(rate_dps[row]), temperature_c, float(apart[row]))
+                most = replace(
+                    most, rate_dps=share * float(rate_dps[row]), temperature_c=temperature_c,
+                    difference_dps=float(apart[row]),
+                )  # fmt: skip
     return most if most.difference_dps > 0 else None
 
 

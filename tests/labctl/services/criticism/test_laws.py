@@ -46,6 +46,10 @@ def test_an_unexplained_residual_has_a_law_that_the_model_can_take(store: Store)
     found = criticise_unit(store, unit.serial, 1, None)
     assert found.verdict == "unexplained"
     law = found.laws[0]
+    assert found.law_test is not None
+    assert "half-way between the rates of the recordings" in found.law_test["do"]
+    halfway = np.array(parse_recipe(found.law_test["toml"]).rates_dps)
+    assert not np.any(np.isclose(np.abs(halfway) % 20.0, 0.0))  # between the rates of Ojeda's schedule
     coefficient = law["coefficients"]["z"]["law_1"]
     assert coefficient["value"] == pytest.approx(SIZE_DPS, rel=0.05)
     assert law["equations"]["z"].startswith(f"{coefficient['value']:.4g} * sin(")

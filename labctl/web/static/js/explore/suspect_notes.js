@@ -107,7 +107,7 @@ export function lawList({ criticism, axis, motion }, onlaw) {
         ),
       ),
     ),
-    test ? h("p", {}, `To distinguish the first two, ${test.do}.`) : null,
+    test ? h("p", {}, `To ${laws.length > 1 ? "distinguish the first two" : "test it"}, ${test.do}.`) : null,
   );
 }
 

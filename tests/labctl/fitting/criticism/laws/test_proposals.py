@@ -77,11 +77,13 @@ def test_it_says_what_else_would_follow(found: Criticism, laws: list[Law]) -> No
 
 @pytest.mark.slow
 def test_two_laws_are_told_apart_where_they_differ_most(found: Criticism, laws: list[Law]) -> None:
-    """Of one law there is nothing to tell; two that differ in period part where no data set is."""
-    assert breaking(laws[:1], found) is None
+    """Of one law it is where it differs from the model; two that differ in period part where no data set is."""
+    assert breaking([], found) is None
     other = replace(laws[0], fit=found.base)
     place = breaking([laws[0], other], found)
     assert place is not None
+    assert place.laws == 2
+    assert breaking(laws[:1], found) == replace(place, laws=1)
     assert place.difference_dps > SIZE_DPS / 2
     assert abs(place.rate_dps) <= 125.0
 
