@@ -134,7 +134,8 @@ def _other(outcome: Outcome) -> float:
 
 def table(found: list[Followed]) -> str:
     """Return the shares, per cent, by size and of all."""
-    columns = [[one for one in found if z in (one.outcome.case.z, 0.0)] for z in (*ASKED_Z, 0.0)]
+    sizes = sorted({one.outcome.case.z for one in found})
+    columns = [*([one for one in found if one.outcome.case.z == z] for z in sizes), found]
     counts: dict[str, Callable[[Outcome], bool]] = {
         "likeliest within 10 % at the points of all recordings and on the other recording":
             lambda o: bool(o.proposals) and o.proposals[0].good,
@@ -150,7 +151,7 @@ def table(found: list[Followed]) -> str:
     rows.append(
         ["median hours beyond the first recording", *(f"{np.median([o.hours for o in c]):.1f}" for c in columns)]
     )
-    return markdown(["%", *(f"z = {z:g}" for z in ASKED_Z), "all"], rows)
+    return markdown(["%", *(f"z = {z:g}" for z in sizes), "all"], rows)
 
 
 def missed(found: list[Followed]) -> str:
