@@ -30,9 +30,12 @@ from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.blas_threads import single_threaded
 from labctl.fitting.numeric.json_numbers import none_for_nan
 from labctl.progress import report_stage
+from labctl.recording.columns import RECORDING
 
 #: Laws at most that are proposed, and states of the search that are looked through for them.
 MAX_LAWS, MAX_TRIED = 5, 16
+#: The time since the start of the first recording, s.
+TIME = "t_s"
 #: Channels besides the rate that a law may depend on, the first of those that the residual follows.
 MAX_CHANNELS = 2
 #: Two laws are one where what they take off the data sets is so alike.
@@ -154,12 +157,13 @@ def _channels(criticism: Criticism) -> list[str]:
     """Return the rate, and the first channels that the residual follows; the temperature where it follows none.
 
     A temperature that was held is left out, and so is a channel that moved with the temperature: the schedule does not
-    say which of the two it is.
+    say which of the two it is. In several recordings the time is a date: a law of it says nothing of another day.
     """
+    dates = {TIME} if RECORDING in criticism.fit_data.channels else set[str]()
     follows = [
         name
         for name in criticism.verdict.depends_on
-        if name != TABLE_RATE and not _moved_with_temperature(criticism, name)
+        if name not in {TABLE_RATE, *dates} and not _moved_with_temperature(criticism, name)
     ]
     if np.ptp(criticism.fit_data.temperature_c) <= ONE_LEVEL_SPAN_C:
         follows = [name for name in follows if name != TEMPERATURE]

@@ -17,7 +17,9 @@ from labctl.fitting.criticism import (
     criticise,
     laws_of,
 )  # fmt: skip
+from labctl.fitting.criticism.laws.proposals import _channels
 from labctl.fitting.data.fit_data import fit_data_of
+from labctl.fitting.data.joined import joined_recording
 from labctl.fitting.effects import Term
 from labctl.fitting.effects.formula import read_formula
 from labctl.fitting.estimation.fit import fit_preset
@@ -102,6 +104,16 @@ def test_a_law_is_tested_along_the_channel_over_which_it_bends_most(formula: str
     fit = fit_preset(found.fit_data, changed(model, (term,)))
     law = Law((term,), ("a law",), 0.0, 1.0, fit, {})
     assert bends_over(law, found) == channel
+
+
+@pytest.mark.parametrize(("recordings", "channels"), [
+    (1, ["table_rate_dps", "t_s", "temperature_c"]), (2, ["table_rate_dps", "supply_v", "temperature_c"]),
+])  # fmt: skip
+def test_of_several_recordings_no_law_follows_the_time_which_is_a_date(recordings: int, channels: list[str]) -> None:
+    whole = joined_recording({seed: single_axis(seed) for seed in range(3, 3 + recordings)})
+    found = criticise(whole, usual_model(fit_data_of(to_points(whole))), full=False)
+    verdict = replace(found.verdict, form="unexplained", depends_on=("table_rate_dps", "t_s", "supply_v"))
+    assert _channels(replace(found, verdict=verdict)) == channels
 
 
 def test_nothing_is_proposed_for_noise() -> None:
