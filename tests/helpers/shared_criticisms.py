@@ -13,6 +13,7 @@ from labctl.fitting.criticism import Criticism
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.recording import Recording
 from labctl.services.criticism import evaluation
+from labctl.services.criticism import laws as laws_answered
 
 
 def digest_of(recording: Recording, model: ErrorModel) -> str:
@@ -49,10 +50,10 @@ def criticised_once() -> Iterator[None]:
             made[question] = find_laws(found)
         return made[question]
 
-    find_laws = evaluation.proposed_laws
+    find_laws = laws_answered.laws_of
     with (
         patch.object(evaluation, "fit_means", once("fit", evaluation.fit_means)),
         patch.object(evaluation, "criticise", once("criticism", evaluation.criticise)),
-        patch.object(evaluation, "proposed_laws", laws),
+        patch.object(laws_answered, "laws_of", laws),
     ):
         yield
