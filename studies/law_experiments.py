@@ -1,4 +1,4 @@
-"""Laws that labctl proposes after it has measured what it asks for: are they the hidden ones, on other data?
+"""Laws that labctl proposes once the experiments that test laws were measured: are they the hidden ones, elsewhere?
 
 The cases are those of `studies.laws` on the published single-axis schedule. Each is criticised, and the experiment that
 labctl proposes to test the likeliest law is measured as well: half-way between the rates of the recipe, or half-way

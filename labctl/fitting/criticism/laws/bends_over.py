@@ -27,13 +27,12 @@ def bends_over(law: Law, criticism: Criticism) -> str:
     data = criticism.fit_data
     values = {axis: law_dps(law, data.channels, axis) for axis in data.outputs}
     axis = max(values, key=lambda name: float(np.abs(values[name]).max()))
-    shares = np.linspace(-1.0, 1.0, PLACES)
-    fastest = float(np.abs(data.channels.rate_dps(axis)).max())
-    over_rate = [_at_rate(data.channels, axis, share * fastest) for share in shares]
     if not data.channels.history.thermometer:
         return TABLE_RATE
+    fastest_dps = float(np.abs(data.channels.rate_dps(axis)).max())
+    over_rate = [_at_rate(data.channels, axis, share * fastest_dps) for share in np.linspace(-1.0, 1.0, PLACES)]
     levels_c = np.linspace(data.temperature_c.min(), data.temperature_c.max(), PLACES)
-    over_temperature = [at_temperature(data.channels, axis, level_c) for level_c in levels_c]
+    over_temperature = [_at_temperature(data.channels, axis, level_c) for level_c in levels_c]
     return TEMPERATURE if _bend(law, axis, over_temperature) > _bend(law, axis, over_rate) else TABLE_RATE
 
 
@@ -41,8 +40,7 @@ def _at_rate(channels: Channels, axis: str, rate_dps: float) -> Channels:
     return channels.with_rates({**channels.rates, axis: np.full(len(channels), rate_dps)})
 
 
-def at_temperature(channels: Channels, axis: str, temperature_c: float) -> Channels:
-    """Return channels with one temperature in every row, deg C, also by the own thermometer of an axis."""
+def _at_temperature(channels: Channels, axis: str, temperature_c: float) -> Channels:
     same = np.full(len(channels), temperature_c)
     own = {name: same for name in (f"temperature_{axis}_c",) if name in channels.columns}
     return replace(channels, columns={**channels.columns, TEMPERATURE: same, **own})
